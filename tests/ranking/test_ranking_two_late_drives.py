@@ -9,7 +9,6 @@ from vpm.experiment import Experiment
 from vpm.ranking.look import Look
 from vpm.ranking.ranking_search import Search
 from vpm.ranking.settings import Settings
-from vpm.ranking.tracked_records import TrackedRecords
 from vpm.ranking.tried_effect import Trial
 
 STEP, LATE, PARTS = 4e-3, 3, 8
@@ -68,8 +67,8 @@ class Misled(Search):
 
 def test_a_lag_is_dropped_once_both_drives_are_late() -> None:
     tried, record = ["input_delay", "actuator_lag"], late()
-    search = Misled(STAGE, [record], tried, Settings(), None, ParallelCandidates(1, None), lambda _: None)
-    ranking = search.run(TrackedRecords(STAGE, [record], Settings()))
+    search = Misled(STAGE, [record], tried, Settings(), None, ParallelCandidates(1, None), lambda _: None, [record])
+    ranking = search.run()
     assert ranking.rounds[0][0].effect == "actuator_lag"
     assert {(one.effect, one.site) for one in ranking.effects} == {("input_delay", "first"), ("input_delay", "second")}
     for one in ranking.effects:  # at the values that both have beside each other

@@ -45,6 +45,8 @@ class Judgement(Storable):
         A shift of all commands, or of its readings, within one sample that does as well; "" if none does.
     apart : bool
         Whether it has a gap whose contacts never meet in the records, so that only their roundings act.
+    refuted : float
+        By how much less probable validation records are with it, nats, where that refutes it.
     """
 
     removed: float
@@ -59,6 +61,7 @@ class Judgement(Storable):
     reshaped: str = ""
     timed: str = ""
     apart: bool = False
+    refuted: float = 0.0
 
     @property
     def words(self) -> str:
@@ -87,6 +90,8 @@ class Judgement(Storable):
 
     def lacks(self, settings: Settings) -> str:
         """Text on what a judgement lacks to count; "" where it counts."""
+        if self.refuted:
+            return f"it {self.words}, but validation records are {self.refuted:.3g} nats less probable with it"
         if self.least <= settings.worth:
             return f"it {self.words}; {rough_percent(settings.worth)} have to go"
         if not self.is_repeated(settings):

@@ -16,7 +16,6 @@ from vpm.one_thread import in_one_thread
 from vpm.ranking.ranking_search import Search
 from vpm.ranking.result import Ranking
 from vpm.ranking.settings import Settings
-from vpm.ranking.tracked_records import TrackedRecords
 from vpm.simulate import Setup
 
 #: Said of channels that are not compared.
@@ -50,7 +49,8 @@ def rank(
     experiments : Experiment or sequence of Experiment
         Positions of joints, or of as many independent transmissions, and commands of actuators.
     validate : Experiment or sequence of Experiment, optional
-        Records that decide nothing; `Ranking.gaps` is measured on them, once, when all is found.
+        Records that nothing is fitted to. They refute an effect with which they are less probable by `Settings.odds`
+        than without; `Ranking.gaps` is measured on them, once, when all is found.
     effects : sequence of str, optional
         Restrict the catalogue to these names.
     settings : Settings, optional
@@ -91,8 +91,7 @@ def rank(
     records, unseen = without_derived(records, derived), without_derived(unseen, derived)
     each = ParallelCandidates(workers, progress)
     names = asked_for(effects)
-    search = Search(model, records, names, settings or Settings(), setup, each, tell or (lambda _: None))
-    # What a validation record lacks is said before the search.
-    ranking = search.run(TrackedRecords(model, unseen, search.settings, setup))
+    search = Search(model, records, names, settings or Settings(), setup, each, tell or (lambda _: None), unseen)
+    ranking = search.run()
     told = [COMPUTED.format(channel=channel, source=source) for channel, source in derived.items()]
     return replace(ranking, notes=(*zeros, *told, *ranking.notes))

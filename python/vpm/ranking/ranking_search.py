@@ -24,7 +24,6 @@ from vpm.ranking.noise_model import fitted_noise
 from vpm.ranking.result import Gap, Ranked, Ranking
 from vpm.ranking.settings import OFF_ENDS
 from vpm.ranking.several_at_once import several_at_once, with_usual_friction
-from vpm.ranking.tracked_records import TrackedRecords
 from vpm.ranking.trials import Trials
 from vpm.ranking.tried_effect import Trial
 from vpm.ranking.validation_errors import gaps
@@ -39,7 +38,7 @@ SMOOTH = ("first_order", "cubic")
 class Search(Trials):
     """Search of a ranking over structures that grow by one effect at a time."""
 
-    def run(self, held_out: TrackedRecords) -> Ranking:
+    def run(self) -> Ranking:
         """Run the search of a ranking, see `rank`."""
         looks = self._first_looks()
         named: dict[_Place, Ranked] = {}
@@ -90,7 +89,7 @@ class Search(Trials):
             interrupted = True
         ranking = self._ranking(looks, named, rounds, interrupted=interrupted)
         try:
-            return replace(ranking, gaps=self._gaps(held_out.with_hold(ranking.hold), ranking))
+            return replace(ranking, gaps=self._gaps(ranking))
         except KeyboardInterrupt:
             return replace(ranking, interrupted=True)
 
@@ -188,14 +187,13 @@ class Search(Trials):
         """Notes of the search on records that what it found does not explain."""
         return tuple(disturbed(self.fitter.tracked, look.fitted, self.settings))
 
-    def _gaps(self, held_out: TrackedRecords, ranking: Ranking) -> dict[str, Gap]:
+    def _gaps(self, ranking: Ranking) -> dict[str, Gap]:
         """Errors of what the search found on validation records, under the fastest tracker that an effect came in by.
 
         A slow one lets a machine stick and slip where its own controller held it.
         """
         band = max((one.band for one in ranking.effects), default=self.settings.bands[0])
-        held_out = held_out.with_pressures(self.fitter.tracked.of_pressures)
-        return gaps(held_out, (self.start.model, ranking.recalibrated, ranking.model), band)
+        return gaps(self.held_out_as_fitted, (self.start.model, ranking.recalibrated, ranking.model), band)
 
     def _held(self, looks: Sequence[Look], best: Trial | None) -> list[Look]:
         """Search again with commands that change between samples, where no effect does as well; else none.
@@ -311,11 +309,12 @@ class Search(Trials):
         counting += self._counting_elsewhere(counting)
         while counting:
             best, *others = weighed(counting, self.fitter)
-            best = against_timing(best, self.fitter)
+            best = self.against_validation(against_timing(best, self.fitter))
             if best.counts and best.evidence > self.settings.odds:
                 self.others[best.key] = [trial.fitted.structure for trial in others]
                 return best, [best, *others, *told, *tried]
             # It leaves less error because it answers to noise otherwise, or comes in time; no sample is more probable.
+            # Or validation records are less so.
             told.append(best)
             counting = [trial for trial in counting if trial.fitted is not best.fitted]
         return None, told + tried

@@ -118,7 +118,7 @@ class Ranking(Result):
     recalibrated : Model
         As it was, its uncertain parameters fitted.
     gaps : dict of str to Gap
-        By channel, on records that decided nothing; empty if there are none, or Ctrl-C came before they were measured.
+        By channel, on validation records; empty if there are none, or Ctrl-C came before they were measured.
     interrupted : bool
         Ctrl-C ended the search, where there may be more, or the measuring of what it found.
     hold : str

@@ -55,7 +55,7 @@ def _at_several_places(trials: Trials, looks: list[Look], best: Trial | None, tr
             look = trials.look(trial.fitted)
             new = [key for key in trial.fitted.structure.effects if key not in trial.look.fitted.structure.effects]
             found = list(takewhile(trials.stands, (trials.weighed_beside_others(key, look) for key in new)))
-            if len(found) == len(new):
+            if len(found) == len(new) and trials.against_validation(trial).counts:
                 trials.say(f"{trial.key[0]} at {' and '.join(site for _, site in new)} together {trial.removing}")
                 return trials.all_looks(look), [trials.listed(one, [one]) for one in found]
     return looks, []

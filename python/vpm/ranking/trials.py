@@ -33,6 +33,7 @@ from vpm.ranking.structure_extensions import Extensions
 from vpm.ranking.substitute_records import shown, why_unbalanced
 from vpm.ranking.tracked_records import TrackedRecords, Tracker
 from vpm.ranking.tried_effect import Trial
+from vpm.ranking.validation_errors import density
 from vpm.simulate import Setup
 
 
@@ -48,10 +49,12 @@ class Trials:
         setup: Setup | None,
         each: ParallelCandidates,
         say: Callable[[str], None],
+        unseen: Sequence[Experiment] = (),
     ) -> None:
         settings = below_own_vibration(settings, model, records)
         self.names, self.settings, self.each, self.say = names, settings, each, say
         self.fitter = Fitter(TrackedRecords(model, records, settings, setup), settings)
+        self.held_out = TrackedRecords(model, unseen, settings, setup)
         self.data = shown(model, self.fitter.tracked)
         self.bands = () if why_unbalanced(model, records) else wider_bands(model, self.data)
         self.sizes = Sizes(model, self.data)
@@ -203,6 +206,27 @@ class Trials:
         ends = self.each("finishing", one_finished, _foremost(hopeful), lambda trial: trial.label)
         return [end for end in ends if isinstance(end, Trial)]
 
+    @property
+    def held_out_as_fitted(self) -> TrackedRecords:
+        """Validation records of the search, with commands and pressures between samples as fits have them."""
+        tracked = self.fitter.tracked
+        return self.held_out.with_hold(tracked.setup.course).with_pressures(tracked.of_pressures)
+
+    def against_validation(self, trial: Trial) -> Trial:
+        """Trial of the search that counts, refuted where validation records are less probable with its effect.
+
+        What makes up for errors of laws in some motions is wrong in others. Of what is missing, records that do not
+        excite it say nothing: an effect has to lose as much there as it had to gain.
+        """
+        if not trial.counts or not self.held_out.records:
+            return trial
+        held_out, band, order = self.held_out_as_fitted, trial.fitted.tracker.band, self.settings.order
+        models = (one.structure.repaired for one in (trial.look.fitted, trial.fitted))
+        without, with_it = (density(held_out, model, band, order) for model in models)
+        if not np.isfinite(without) or without - with_it <= self.settings.odds:
+            return trial
+        return replace(trial, judgement=replace(trial.judgement, refuted=without - with_it))
+
     def examined(self, trial: Trial) -> Trial:
         """Trial of the search that counts, asked what it explains of noise, and what other shapes would do."""
         judged = replace(trial.judgement, apart=self._stays_apart(trial))
@@ -281,14 +305,14 @@ class Trials:
         return trial.counts and trial.evidence > self.settings.odds
 
     def listed(self, best: Trial | None, tried: Sequence[Trial]) -> tuple[Ranked, ...]:
-        """All effects that the search tried: accepted ones, then by the error that they leave."""
+        """All effects that the search tried: accepted ones, those that were weighed, then by the error that they leave."""
         several: dict[Key, Ranked] = {}
         told = [trial for trial in tried if np.isfinite(trial.evidence)]
         gains = [trial.evidence - self.settings.odds for trial in told]
         *shares, _, _ = robust_probabilities(gains, self.settings.tempering, self.settings.astray)
         probability = {id(trial): float(share) for trial, share in zip(told, shares, strict=True)}
         labels = {trial.label: probability[id(trial)] for trial in told}
-        for trial in sorted(tried, key=lambda trial: (trial is not best, trial.left)):
+        for trial in sorted(tried, key=lambda trial: (trial is not best, np.isnan(trial.evidence), trial.left)):
             own = probability.get(id(trial), np.nan)
             alike = sum(labels.get(label, 0.0) for label in trial.rivals)
             ranked = self._ranked(trial, own, own + alike)

@@ -1,4 +1,4 @@
-"""Errors of a model on validation records, as a tracker leaves them."""
+"""Errors of a model on validation records, as a tracker leaves them, and how probable these records are by it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from vpm.model import Model
 from vpm.numbers import Array
 from vpm.ranking.fit import ASTRAY
 from vpm.ranking.model_structure import approximate, without_sizes
-from vpm.ranking.noise_model import Parts, Structured
+from vpm.ranking.noise_model import Parts, Structured, fitted_noise
 from vpm.ranking.result import Gap
 from vpm.ranking.tracked_records import TrackedRecords, Tracker
 
@@ -27,7 +27,7 @@ def gaps(held_out: TrackedRecords, stages: tuple[Model, Model, Model], band: flo
     """
     if not held_out.records:
         return {}
-    parts = [slice(part.start, held.stop) for part, held in zip(held_out.parts, held_out.held_back, strict=True)]
+    parts = _whole(held_out)
     before, recalibrated, after = (_left(held_out, model, model.theta, band, parts) for model in stages)
     found = stages[-1]
     bare = _left(held_out, found, without_sizes(found, found.theta, approximate(found)), band, parts)
@@ -54,6 +54,26 @@ def gaps(held_out: TrackedRecords, stages: tuple[Model, Model, Model], band: flo
         )
         for name, unit, level, share, floor in zip(names, units, levels.T, shares, noise, strict=True)
     }
+
+
+def density(held_out: TrackedRecords, model: Model, band: float, order: int) -> float:
+    """Log-density of validation records as a tracker of this bandwidth (Hz) predicts them, under their own spectrum.
+
+    - ``order``: of the spectrum
+
+    It is minus infinity where the model diverges.
+    """
+    parts = _whole(held_out)
+    residual = _left(held_out, model, model.theta, band, parts)
+    if not np.all(np.isfinite(residual)):
+        return -np.inf
+    noise = fitted_noise(residual, parts, order)
+    return float(np.sum(noise.log_density(noise.whitened(residual, parts))))
+
+
+def _whole(held_out: TrackedRecords) -> list[slice]:
+    """Validation samples that count: nothing is held back of them."""
+    return [slice(part.start, held.stop) for part, held in zip(held_out.parts, held_out.held_back, strict=True)]
 
 
 def _left(tracked: TrackedRecords, model: Model, theta: Array, band: float, parts: Parts) -> Array:
