@@ -305,7 +305,7 @@ class Trials:
         return trial.counts and trial.evidence > self.settings.odds
 
     def listed(self, best: Trial | None, tried: Sequence[Trial]) -> tuple[Ranked, ...]:
-        """All effects that the search tried: accepted ones, those that were weighed, then by the error that they leave."""
+        """All effects that the search tried: the accepted one, what was weighed, then by the error that they leave."""
         several: dict[Key, Ranked] = {}
         told = [trial for trial in tried if np.isfinite(trial.evidence)]
         gains = [trial.evidence - self.settings.odds for trial in told]
