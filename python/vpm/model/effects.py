@@ -300,8 +300,8 @@ def _on_joint(effect: Effect, structure: Structure, numbers: dict[str, int], ind
     law = {"type": effect.name, "joint": places.index(behind or before), **numbers}
     if effect.of_spring:
         return [law]
-    others = (one for one in structure.document.effects if one.at == effect.at and one.traits.has_play)
-    return [inertia] if effect.type.winds_up and any(others) else [law, inertia]
+    loose = any(one.at == effect.at and one.traits.has_play for one in structure.document.effects)
+    return [inertia] if loose and effect.type.winds_up else [law, inertia]
 
 
 def _carrier(site: str, structure: Structure) -> dict[str, int]:
