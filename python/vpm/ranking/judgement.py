@@ -46,7 +46,7 @@ class Judgement(Storable):
     apart : bool
         Whether it has a gap whose contacts never meet in the records, so that only their roundings act.
     refuted : float
-        By how much less probable validation records are with it, nats, where that refutes it.
+        Share of the error power that it adds to validation records, where that refutes it.
     """
 
     removed: float
@@ -91,7 +91,7 @@ class Judgement(Storable):
     def lacks(self, settings: Settings) -> str:
         """Text on what a judgement lacks to count; "" where it counts."""
         if self.refuted:
-            return f"it {self.words}, but validation records are {self.refuted:.3g} nats less probable with it"
+            return f"it {self.words}, but adds {rough_percent(self.refuted)} to that of validation records"
         if self.least <= settings.worth:
             return f"it {self.words}; {rough_percent(settings.worth)} have to go"
         if not self.is_repeated(settings):

@@ -49,8 +49,8 @@ def rank(
     experiments : Experiment or sequence of Experiment
         Positions of joints, or of as many independent transmissions, and commands of actuators.
     validate : Experiment or sequence of Experiment, optional
-        Records that nothing is fitted to. They refute an effect with which they are less probable by `Settings.odds`
-        than without; `Ranking.gaps` is measured on them, once, when all is found.
+        Records that nothing is fitted to. They refute an effect that adds as much to their error power as it had to
+        remove elsewhere, `Settings.worth`; `Ranking.gaps` is measured on them, once, when all is found.
     effects : sequence of str, optional
         Restrict the catalogue to these names.
     settings : Settings, optional

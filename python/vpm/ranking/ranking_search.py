@@ -314,7 +314,7 @@ class Search(Trials):
                 self.others[best.key] = [trial.fitted.structure for trial in others]
                 return best, [best, *others, *told, *tried]
             # It leaves less error because it answers to noise otherwise, or comes in time; no sample is more probable.
-            # Or validation records are less so.
+            # Or it does harm to validation records.
             told.append(best)
             counting = [trial for trial in counting if trial.fitted is not best.fitted]
         return None, told + tried

@@ -33,7 +33,7 @@ from vpm.ranking.structure_extensions import Extensions
 from vpm.ranking.substitute_records import shown, why_unbalanced
 from vpm.ranking.tracked_records import TrackedRecords, Tracker
 from vpm.ranking.tried_effect import Trial
-from vpm.ranking.validation_errors import density
+from vpm.ranking.validation_errors import powers
 from vpm.simulate import Setup
 
 
@@ -213,19 +213,19 @@ class Trials:
         return self.held_out.with_hold(tracked.setup.course).with_pressures(tracked.of_pressures)
 
     def against_validation(self, trial: Trial) -> Trial:
-        """Trial of the search that counts, refuted where validation records are less probable with its effect.
+        """Trial of the search that counts, refuted where its effect does harm to validation records.
 
         What makes up for errors of laws in some motions is wrong in others. Of what is missing, records that do not
-        excite it say nothing: an effect has to lose as much there as it had to gain.
+        excite it say nothing: an effect has to add as much to the error power there as it had to remove.
         """
         if not trial.counts or not self.held_out.records:
             return trial
-        held_out, band, order = self.held_out_as_fitted, trial.fitted.tracker.band, self.settings.order
-        models = (one.structure.repaired for one in (trial.look.fitted, trial.fitted))
-        without, with_it = (density(held_out, model, band, order) for model in models)
-        if not np.isfinite(without) or without - with_it <= self.settings.odds:
+        held_out, band = self.held_out_as_fitted, trial.fitted.tracker.band
+        without, with_it = (powers(held_out, one.structure.repaired, band) for one in (trial.look.fitted, trial.fitted))
+        added = float(np.prod(with_it / np.maximum(without, 1e-300))) - 1.0
+        if not added > self.settings.worth:
             return trial
-        return replace(trial, judgement=replace(trial.judgement, refuted=without - with_it))
+        return replace(trial, judgement=replace(trial.judgement, refuted=added))
 
     def examined(self, trial: Trial) -> Trial:
         """Trial of the search that counts, asked what it explains of noise, and what other shapes would do."""

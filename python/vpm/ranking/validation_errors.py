@@ -1,4 +1,4 @@
-"""Errors of a model on validation records, as a tracker leaves them, and how probable these records are by it."""
+"""Errors of a model on validation records, as a tracker leaves them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from vpm.model import Model
 from vpm.numbers import Array
 from vpm.ranking.fit import ASTRAY
 from vpm.ranking.model_structure import approximate, without_sizes
-from vpm.ranking.noise_model import Parts, Structured, fitted_noise
+from vpm.ranking.noise_model import Parts, Structured
 from vpm.ranking.result import Gap
 from vpm.ranking.tracked_records import TrackedRecords, Tracker
 
@@ -56,19 +56,11 @@ def gaps(held_out: TrackedRecords, stages: tuple[Model, Model, Model], band: flo
     }
 
 
-def density(held_out: TrackedRecords, model: Model, band: float, order: int) -> float:
-    """Log-density of validation records as a tracker of this bandwidth (Hz) predicts them, under their own spectrum.
-
-    - ``order``: of the spectrum
-
-    It is minus infinity where the model diverges.
-    """
+def powers(held_out: TrackedRecords, model: Model, band: float) -> Array:
+    """Mean square of validation errors by channel (m,) under a tracker of this bandwidth (Hz); NaN if it diverges."""
     parts = _whole(held_out)
     residual = _left(held_out, model, model.theta, band, parts)
-    if not np.all(np.isfinite(residual)):
-        return -np.inf
-    noise = fitted_noise(residual, parts, order)
-    return float(np.sum(noise.log_density(noise.whitened(residual, parts))))
+    return np.asarray(np.mean(np.concatenate([residual[part] for part in parts]) ** 2, axis=0))
 
 
 def _whole(held_out: TrackedRecords) -> list[slice]:
