@@ -20,6 +20,7 @@ from vpm.errors import CoreError, ModelError, VpmError
 from vpm.experiment import Experiment
 from vpm.identify import identify
 from vpm.model import Model
+from vpm.model.loops import closure
 from vpm.numbers import Array
 from vpm.scenario import Scenario
 from vpm.simulate import Setup, simulate
@@ -62,6 +63,17 @@ def null_space_accelerations(model: Model, q: Array, v: Array) -> Array:
 
 
 # ---- a parallelogram: one degree of freedom in closed form ----------------------------------------------------------
+
+
+def test_the_assembly_of_a_file_is_worked_out_once(parallelogram: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = parallelogram.loops.assembled()
+    monkeypatch.setattr(closure, "assembled", lambda *_: pytest.fail("it was worked out again"))
+    again = parallelogram.loops.assembled()
+    np.testing.assert_array_equal(again, first)
+    again[:] = 0.0
+    np.testing.assert_array_equal(parallelogram.loops.assembled(), first)
+    other = parallelogram.with_parameters({"left.mass": 2.0})
+    assert other.loops is not parallelogram.loops
 
 
 def test_a_parallelogram_moves_as_its_closed_form(parallelogram: Model) -> None:

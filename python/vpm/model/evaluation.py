@@ -1,6 +1,7 @@
 """What a model answers about a single state: rest, vibrations, linear behaviour."""
 
 from collections.abc import Iterator, Mapping
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,7 +18,7 @@ from vpm.numbers import Array, array_of, number_of
 class Evaluations(Motions):
     """The part of a model that asks the core about rest and about one state of a simulation."""
 
-    @property
+    @cached_property
     def loops(self) -> Loops:
         """Closed loops to evaluate: assemblies, independent coordinates, efforts, rest, singularities."""
         return Loops(self)

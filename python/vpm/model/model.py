@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 #: What a model keeps of its own values; the rest of what it keeps holds for all models of the same structure.
-_OF_VALUES = frozenset({"_checked", "_path", "_content", "parameters", "theta", "dynamics"})
+_OF_VALUES = frozenset({"_checked", "_path", "_content", "parameters", "theta", "dynamics", "loops"})
 
 
 class Model(Evaluations, Storable):

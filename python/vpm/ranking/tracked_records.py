@@ -99,6 +99,7 @@ class TrackedRecords:
         #: Channels of those drawn that show a joint, and no pressure.
         self.drawn_joints = tuple(name for name in self.drawn_to if not _chamber(model, name))
         self._starts: WeakKeyDictionary[Model, list[Array]] = WeakKeyDictionary()
+        self._starts[model] = [record.first for record in self.records]
         self._bent: WeakKeyDictionary[Model, dict[int, Array]] = WeakKeyDictionary()
         ends = np.cumsum([len(record.time) for record in self.records])
         cuts = [

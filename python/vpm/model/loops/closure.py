@@ -103,11 +103,15 @@ class Loops:
             A name is unknown, or the loops do not close there; the message names the gap that is left.
             Or two assemblies are as near to where the others begin, as from a stretched pose; the message tells both.
         """
-        held = held or {}
-        q, fixed = self._begun(held, guess or {})
+        if not held and not guess and self._decided is not None:
+            return self._decided.copy()
+        return self._assembled(held or {}, guess or {})
+
+    def _assembled(self, held: Mapping[str, float], guess: Mapping[str, float]) -> Array:
+        q, fixed = self._begun(held, guess)
         closed = assembled(self, q, fixed, len(self._model.joints))
         self._complain(closed, held)
-        if {*self._model.joints} - {*held} - {*(guess or {})}:
+        if {*self._model.joints} - {*held} - {*guess}:
             self._refuse_two(closed, q, fixed)
         return closed
 
@@ -342,7 +346,7 @@ class Loops:
     def _decided(self) -> Array | None:
         """Closure that the model file begins with, if it tells one."""
         try:
-            return self.assembled()
+            return self._assembled({}, {})
         except ModelError:
             return None
 
