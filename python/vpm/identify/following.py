@@ -14,7 +14,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from threading import Lock
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 
@@ -31,7 +31,9 @@ Pair = tuple[Array, Array]
 Filter = Callable[[Array], Array]
 #: Unfiltered numbers of a part, and their derivatives, by its values and the places of its parameters.
 Work = Callable[[Array, Sequence[int]], Pair]
-Built = TypeVar("Built")
+Object = TypeVar("Object")
+#: What no parameter changes, by what it depends on.
+Built: TypeAlias = OrderedDict[Hashable, object]
 
 #: Answers that are kept for all records: what one round of a search asks, the next one asks again.
 KEPT = 1000
@@ -55,12 +57,15 @@ class Answer:
 
 
 class Memo:
-    """Answers by what they depend on; safe to be used by several threads."""
+    """Answers by what they depend on; safe to be used by several threads.
 
-    def __init__(self) -> None:
+    - ``built``: what no parameter changes, where others have built it; theirs may be added to
+    """
+
+    def __init__(self, built: Built | None = None) -> None:
         self._lock = Lock()
         self._answers: OrderedDict[Hashable, Answer] = OrderedDict()
-        self._built: OrderedDict[Hashable, object] = OrderedDict()
+        self._built: Built = OrderedDict() if built is None else built
         self._numbers = 0
 
     def recall(self, key: Hashable, names: Sequence[str], work: Callable[[Sequence[str]], Pair]) -> Pair:
@@ -83,7 +88,7 @@ class Memo:
                 self._answers.move_to_end(key)
             return self._answers.get(key)
 
-    def once(self, key: Hashable, build: Callable[[], Built]) -> Built:
+    def once(self, key: Hashable, build: Callable[[], Object]) -> Object:
         """Object of a following machine that no parameter changes, built at the first call."""
         with self._lock:
             if key in self._built:

@@ -12,12 +12,13 @@ import numpy as np
 from vpm.errors import DivergedError, IdentificationError
 from vpm.experiment import Experiment, Motion
 from vpm.identify.first_states import BegunAnywhere
-from vpm.identify.following import Following, Memo, gauge_gains, hold_of
+from vpm.identify.following import Built, Following, Memo, gauge_gains, hold_of
 from vpm.identify.parallel import in_order
 from vpm.identify.parts import Bending
 from vpm.identify.problem import FEWEST_SAMPLES, Block
 from vpm.identify.response_along_motion import (
     Response,
+    answers_at_once,
     bending_of,
     bends,
     check_along,
@@ -61,6 +62,8 @@ class InverseDynamicsProblem(BegunAnywhere):
     - ``band``: highest frequency that is compared, Hz; without it what the motion filter leaves alone
     - ``integrator``: how drives with states of their own are run along the motion, as `vpm.simulate.Setup` names it
     - ``hold``: what inputs do between samples, as the same names it
+    - ``first``: values and places of parameters at which derivatives are asked for first; sizes come with them
+    - ``built``: parts of the model that problems on other records share with this one
     """
 
     mode = "inverse_dynamics"
@@ -74,7 +77,10 @@ class InverseDynamicsProblem(BegunAnywhere):
         band: float | Sequence[float] | None = None,
         integrator: str = AUTOMATIC,
         hold: str = HOLDS[0],
+        first: tuple[Array, Sequence[int]] | None = None,
+        built: Built | None = None,
     ) -> None:
+        self._built = built
         self.experiments = tuple(experiments)
         #: What was given: the model before any fit.
         self.nominal = model
@@ -95,6 +101,9 @@ class InverseDynamicsProblem(BegunAnywhere):
         self._gains = self._hold_gains(model)
         self._known = self._held(self.experiments, self.motions, [integrator] * len(self.motions), None)
         self.workers = 1
+        if first is not None and not answers_at_once(model):
+            for record in range(len(self.motions)):
+                self._answer(model, first[0], record, first[1])
         self.blocks = self._lay_out(model)
         #: What is left at the true values, as far as that is known; see `vpm.identify.closed_loop_prediction`.
         self.expected: Array | float = 0.0
@@ -189,7 +198,7 @@ class InverseDynamicsProblem(BegunAnywhere):
         departures: Array | None,
     ) -> tuple[Following, ...]:
         begun = [None] * len(motions) if departures is None else departures
-        memo, parts = Memo(), zip(motions, experiments, integrators, begun, strict=True)
+        memo, parts = Memo(self._built), zip(motions, experiments, integrators, begun, strict=True)
         return tuple(
             Following(m.parallel, steps, 0, hold_of(self._gains, e, m), departure, record, memo)
             for record, (m, e, steps, departure) in enumerate(parts)
