@@ -267,7 +267,8 @@ class Explainer:
         """Few explanations by a delay of least predicted error if parameters change too.
 
         From fitted values, else from those of the model: a long delay drives fitted ones far away. They have to be
-        predicted to leave about as little as the best correction that is ``known``. All channels are asked: the model
+        predicted to leave about as little as the best correction that is ``known``, and less than their own fit from
+        the fitted values. All channels are asked: the model
         is drawn to every reading, and gives way where it is light. Of a motor and a flywheel on one shaft, a late
         reading of the wheel shows at the motor.
         """
@@ -280,7 +281,8 @@ class Explainer:
             if (near := at or self.judge.tangent(part, self.judge.measured(part), FORCES)) is None:
                 continue
             predicted = partial(self._predicted, part=part, tangent=near)
-            few = self._few(self.each("trying", predicted, corrections, self._words), left, known)
+            likely = self.each("trying", predicted, corrections, self._words)
+            few = self._few([one for one in likely if not _is_reached(one, found)], left, known)
             few = self._leaving_less_effort(few, part, left)
             fit = partial(self._fitted, part=part, tangent=near, left=left)
             fitted = [one for one in self.each("refining", fit, few, self._words) if not isinstance(one, Failure)]
@@ -392,6 +394,13 @@ class Explainer:
 def _is_same(one: Correction, other: Correction) -> bool:
     """Whether two explanations move the same channels in time."""
     return bool(one.delay) and bool(other.delay) and (one.channels, one.column) == (other.channels, other.column)
+
+
+def _is_reached(tried: tuple[Correction, Shares] | Failure, found: Iterable[_Trial]) -> bool:
+    """Whether a fitted explanation by a delay leaves no more than is predicted for another start of that fit."""
+    return not isinstance(tried, Failure) and any(
+        _is_same(tried[0], one.correction) and one.after.cost <= tried[1].cost for one in found
+    )
 
 
 def _is_no_scale(one: Correction, other: Correction) -> bool:

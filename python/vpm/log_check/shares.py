@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +45,8 @@ TRANSITION = 0.02
 TURNS = 2
 #: Pieces of a record between whose ends speeds are measured, which noise hardly moves.
 PIECES = 200
+#: Tracked records that are kept: a few per core.
+KEPT = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +127,20 @@ class _Regressed:
         return {} if has_own_drives(self.model) else self.left
 
 
+class _Numbers:
+    """A record that is equal to another one of the same numbers."""
+
+    def __init__(self, record: Experiment) -> None:
+        self.record = record
+        self._key = (record.channels, record.time.tobytes(), record.data.tobytes())
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Numbers) and self._key == other._key
+
+
 class Judge:
     """Measures records by a model, to which friction and other forces were added at each joint without them.
 
@@ -141,6 +157,8 @@ class Judge:
         for name, at in self.added:
             model = model.with_effect(name, at)
         self.model = model
+        #: One record is tracked with several values in a row.
+        self._tracked_of = lru_cache(KEPT)(lambda one: self._tracked_anew(one.record))
 
     def measured(self, record: Experiment, values: Array | None = None) -> Shares:
         """Shares at given values of the parameters, by default those of the model, without friction that was added."""
@@ -329,15 +347,32 @@ class Judge:
             residual, slope = tracked.follow(self.model, structure.theta, tracker, [len(self.model.theta)])
             known = tangent.slopes[whole.cut : whole.cut + len(residual)]
             start = Tangent(structure, residual, np.concatenate([known, slope * longest_delay], axis=2), tangent.shares)
-            view = View(white_noise(residual, tracked.parts))
-            found, _ = Fitter(tracked, tracked.settings).moved(start.followed(tracker), view, anew=True)
+            found = self._settled(tracked, start.followed(tracker), record.dt)
         except ASTRAY:
             return correction, self._lost(record, tangent.shares.values)
-        *values, delay = found.structure.theta.tolist()
+        *values, delay = found.theta.tolist()
         refined = replace(correction, delay=delay)
         shares = self.measured(refined.applied(record), np.array(values))
-        shares = self._with_departure(shares, without_delay(found.structure))
+        shares = self._with_departure(shares, without_delay(found))
         return refined, replace(shares, efforts=self.efforts_left(refined.applied(record), shares.by_channel))
+
+    def _settled(self, tracked: TrackedRecords, now: Followed, dt: float) -> Structure:
+        """Structure where a fit of an error share beside a delay ends.
+
+        Derivatives cost most, see `freed`. They are worked out anew as long as the last ones moved the delay or gained
+        anything.
+        """
+        fitter, view = Fitter(tracked, tracked.settings), View(white_noise(now.residual, tracked.parts))
+        for _ in range(self.settings.steps):
+            found, _ = fitter.moved(now, view)
+            moved = abs(float(found.structure.theta[-1] - now.structure.theta[-1]))
+            after, before = (
+                self._shares(tracked, one.residual, one.tracker, one.structure.theta).cost for one in (found, now)
+            )
+            if moved < self.settings.delay_tolerance * dt and after > before + math.log(self.settings.alike):
+                break
+            now = fitter.followed(found.structure, now.tracker, now.names, found.residual)
+        return found.structure
 
     def _with_departure(self, shares: Shares, structure: Structure) -> Shares:
         """Shares with how far the parameters of the model are from what its file states."""
@@ -427,8 +462,11 @@ class Judge:
     def _ranking(self, record: Experiment) -> RankingSettings:
         return RankingSettings(bands=(self._tracker(record).band,), iterations=self.settings.steps)
 
-    def _tracked(self, record: Experiment) -> TrackedRecords:
+    def _tracked_anew(self, record: Experiment) -> TrackedRecords:
         return TrackedRecords(self.model, [record], self._ranking(record), self.setup).whole()
+
+    def _tracked(self, record: Experiment) -> TrackedRecords:
+        return self._tracked_of(_Numbers(record))
 
     def _shares(self, tracked: TrackedRecords, residual: Array, tracker: Tracker, values: Array) -> Shares:
         drawn, seen = tracked.drawn(tracker.band), _seen(tracked)
