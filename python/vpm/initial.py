@@ -270,7 +270,7 @@ def _seen(model: Model, experiment: Experiment, theta: Array, state: Array, inte
             internal[place : place + 2] = _chambers(model, experiment, theta, owner, state, internal[place:], row)
         elif quantity == "load":
             first, second = _chambers(model, experiment, theta, owner, state, np.full(2, np.nan), row)
-            full, ring = _areas(model, theta, owner)
+            full, ring = areas_of_chambers(model, theta, owner)
             internal[place] = np.nan_to_num(first - ring / full * second, nan=float(internal[place]))
     return internal
 
@@ -296,7 +296,7 @@ def _chambers(
         return rest[:2]
     joint = model.joints.index(model.joint_of_actuator(name))
     load = float(model.core.equilibrium(theta, coordinates[: len(model.joints)])[1][joint])
-    full, ring = _areas(model, theta, name)
+    full, ring = areas_of_chambers(model, theta, name)
     first, second = logged
     balanced = [(ring * second + load) / full, (full * first - load) / ring]
     supply = model.supply_of_actuator(name)
@@ -320,7 +320,7 @@ def _true(model: Model, theta: Array, channel: str, reading: float) -> float:
     return (reading - error("offset.value", 0.0)) / error("gain.value", 1.0)
 
 
-def _areas(model: Model, theta: Array, name: str) -> tuple[float, float]:
+def areas_of_chambers(model: Model, theta: Array, name: str) -> tuple[float, float]:
     """Areas (m^2) of a cylinder's chambers a and b, for initial pressures."""
     size = {
         key: float(theta[model.index(f"{name}.cylinder.{key}")])

@@ -181,7 +181,7 @@ class _Check:
         """
         record, part, left, model = begun.record, begun.part, begun.left, self.judge.model
         if known is not None and left.above(self.settings.doubtful) and not self.judge.falls(left):
-            left = min(left, self.judge.fitted_from(part, known, left.efforts), key=lambda one: one.order)
+            left = min(left, self.judge.fitted_from(part, known, left), key=lambda one: one.order)
         outputs = measured_outputs(model, record)
         inputs = tuple(name for name in model.input_channels if name in record)
         # A joint may rest while the shafts turn from which its angle is worked out, step by step of their encoders.

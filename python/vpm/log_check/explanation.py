@@ -207,13 +207,19 @@ class Explainer:
     def _leaving_less_effort(self, corrections: Sequence[Change], part: Experiment, left: Shares) -> list[Change]:
         """Corrections with which less is left of the efforts that they affect, and of all; all where none follow.
 
-        What a slow tracker makes of a force that is missing does not enter. Where links bend it takes a run along the
+        What a slow tracker makes of a force that is missing does not enter. Of units and signs of pressures, what the
+        pressures give tells. Where links bend it takes a run along the
         motion, so that many corrections are tried by the tracker alone.
         """
         if len(corrections) > self.settings.finalists and bends(self.model):
             return list(corrections)
 
         def better(correction: Change) -> bool:
+            own = {name for one in correction.each if not one.delay for name in one.channels} & set(left.pressures)
+            if own:
+                pressures = self.judge.pressures_read(correction.applied(part)) or left.pressures
+                if mean_logarithm(pressures, own) > mean_logarithm(left.pressures, own):
+                    return False
             affected = {name for one in correction.each for name in self._affected(one, left)} & set(left.efforts)
             if not affected:
                 return True

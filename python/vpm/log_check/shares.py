@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import OrderedDict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
@@ -14,8 +15,9 @@ from vpm.catalogue import EFFECTS
 from vpm.catalogue.effects import BUILT_IN
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
+from vpm.identify.following import Built
 from vpm.identify.response_along_motion import bends, has_own_drives
-from vpm.initial import initial_state
+from vpm.initial import areas_of_chambers, initial_state
 from vpm.log_check.correction import Correction
 from vpm.log_check.delay import Delayed, with_delay, without_delay
 from vpm.log_check.falling import fall_rate
@@ -72,6 +74,9 @@ class Shares:
     #: Inverse-dynamics residual of the effort at each position, and of strains along the motion; none where drives have
     #: states of their own. Of a velocity what the derivative of its position leaves.
     efforts: Mapping[str, float] = field(default_factory=dict)
+    #: Where drives have states, such a residual at the values of the model, by each pressure of a chamber: as a share
+    #: of what that adds to the effort, or of the whole where that is less. A wrong unit leaves a quarter at least.
+    pressures: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def cost(self) -> float:
@@ -85,7 +90,7 @@ class Shares:
         """
         joint, _, kind = channel.rpartition(".")
         names = (channel, f"{joint}.position") if kind == "velocity" else (channel,)
-        return max(self.efforts.get(name, 1.0) for name in names)
+        return max(self.efforts.get(name, self.pressures.get(name, 1.0)) for name in names)
 
     def unexplained(self, channel: str) -> float:
         """What is left of a channel by its motion and by the efforts that tell of it, whichever is less."""
@@ -121,11 +126,6 @@ class _Regressed:
         except ASTRAY:
             return {}
 
-    @property
-    def efforts(self) -> dict[str, float]:
-        """What tells of commands too: behind measured pressures of drives with states nobody knows of these."""
-        return {} if has_own_drives(self.model) else self.left
-
 
 class _Numbers:
     """A record that is equal to another one of the same numbers."""
@@ -157,6 +157,7 @@ class Judge:
         for name, at in self.added:
             model = model.with_effect(name, at)
         self.model = model
+        self._built: Built = OrderedDict()
         #: One record is tracked with several values in a row.
         self._tracked_of = lru_cache(KEPT)(lambda one: self._tracked_anew(one.record))
 
@@ -172,22 +173,47 @@ class Judge:
 
     def efforts_left(self, record: Experiment, channels: Collection[str]) -> Mapping[str, float]:
         """What is left of the effort at each position, and of velocities among channels; see `Shares.efforts`."""
-        return self._told(record, self._regressed(record, self._structure(record)), channels)
+        near = None if has_own_drives(self.model) else self._regressed(record, self._structure(record))
+        return self._told(record, near, channels)
 
     def _told(self, record: Experiment, near: _Regressed | None, channels: Collection[str]) -> dict[str, float]:
-        """What is left of efforts, and of velocities beside the derivative of their positions; see `Shares.efforts`."""
-        return {**left_of_velocities(record, channels), **({} if near is None else near.efforts)}
+        """What is left of efforts, and of velocities beside the derivative of their positions; see `Shares.efforts`.
+
+        Behind measured pressures of drives with states nobody knows of commands, of which efforts tell too.
+        """
+        told = left_of_velocities(record, channels)
+        return told if near is None or has_own_drives(self.model) else {**told, **near.left}
 
     def efforts_read(self, record: Experiment) -> Mapping[str, float]:
         """Such a residual also where drives have states, if the pressures of both chambers tell what they give."""
-        chambers = {name: {f"{name}.pressure_a", f"{name}.pressure_b"} for name in self.model.actuators}
-        told = {*record.channels}
-        if bends(self.model) or not all(
-            self.model.follows_command(name) or pair <= told for name, pair in chambers.items()
-        ):
-            return {}
-        near = self._regressed(record, self._structure(record))
+        near = self._regressed(record, self._structure(record)) if self._tells_efforts(record) else None
         return {} if near is None else {name: left for name, left in near.left.items() if name.endswith(".position")}
+
+    def pressures_read(self, record: Experiment) -> Mapping[str, float]:
+        """Inverse-dynamics residual at the values of the model, by pressure; see `Shares.pressures`."""
+        drives = [name for name in self.model.actuators if not self.model.follows_command(name)]
+        if not drives or not self._tells_efforts(record) or why_unbalanced(self.model, [record]):
+            return {}
+        try:
+            problem = InverseDynamicsProblem(self.model, [record], built=self._built)
+            left = _left_of_efforts(problem, self.model, self.model.theta)
+        except ASTRAY:
+            return {}
+        found, theta = dict[str, float](), self.model.theta
+        for name in drives:
+            most = max((left.get(f"{one}.position", 1.0) for one in self.model.joints_of_actuator(name)), default=1.0)
+            areas = zip("ab", areas_of_chambers(self.model, theta, name), strict=True)
+            first, second = (area * record[f"{name}.pressure_{side}"] for side, area in areas)
+            power = float(np.var(first - second))
+            for side, force in (("a", first), ("b", second)):
+                found[f"{name}.pressure_{side}"] = _share(most * power, min(power, float(np.var(force))))
+        return found
+
+    def _tells_efforts(self, record: Experiment) -> bool:
+        """Whether a record tells what drives give: by commands alone, or by the pressures of both chambers."""
+        with_states = [name for name in self.model.actuators if not self.model.follows_command(name)]
+        pressures = {f"{name}.pressure_{side}" for name in with_states for side in "ab"}
+        return not bends(self.model) and pressures <= {*record.channels}
 
     def guessed(self, record: Experiment) -> Shares:
         """Shares where a fit would begin, whichever leaves least: at the values of the model, with friction or without.
@@ -214,28 +240,30 @@ class Judge:
         the record, another fit begins where the inverse-dynamics residual is least.
         """
         structure, plain = self._structure(record), self.measured(record)
-        starts, near = [(structure, plain)], self._regressed(record, structure)
-        if near is not None and self._is_lost(plain):
+        starts, is_lost = [(structure, plain)], self._is_lost(plain)
+        near = self._regressed(record, structure) if is_lost or not has_own_drives(self.model) else None
+        pressures = self.pressures_read(record)
+        if near is not None and is_lost:
             there = self.measured(record, near.values)
-            there = replace(there, efforts=self._told(record, near, there.by_channel))
+            there = replace(there, efforts=self._told(record, near, there.by_channel), pressures=pressures)
             if self.falls(there):
                 return there
             starts.append((replace(structure, theta=near.values), there))
         found = [self._fitted(record, *start) or plain for start in starts]
         best = min(found, key=lambda shares: shares.order)
-        return replace(best, efforts=self._told(record, near, best.by_channel))
+        return replace(best, efforts=self._told(record, near, best.by_channel), pressures=pressures)
 
-    def fitted_from(self, record: Experiment, known: Array, efforts: Mapping[str, float]) -> Shares:
+    def fitted_from(self, record: Experiment, known: Array, left: Shares) -> Shares:
         """Shares at values that are ``known`` from another record, or when a fit from there has ended.
 
-        What is left of the ``efforts`` goes by the record alone.
+        What is ``left`` of the efforts goes by the record alone.
         """
         structure, own = self._structure(record), len(self.model.theta)
         values = np.append(known[:own], structure.theta[own:])
         start = self.measured(record, values)
         found = self._fitted(record, replace(structure, theta=values), start)
         best = start if found is None else min(start, found, key=lambda shares: shares.order)
-        return replace(best, efforts=efforts)
+        return replace(best, efforts=left.efforts, pressures=left.pressures)
 
     def _fitted(self, record: Experiment, structure: Structure, start: Shares) -> Shares | None:
         """Shares where a fit ends that begins at the values of a structure and its shares; None if it runs away."""
@@ -283,7 +311,8 @@ class Judge:
             return None
         priors = {name: self._within(name, prior) for name, prior in structure.priors.items()}
         try:
-            problem = InverseDynamicsProblem(self.model, [record])
+            asked = [structure.place(name) for name in priors]
+            problem = InverseDynamicsProblem(self.model, [record], first=(structure.theta, asked), built=self._built)
             return _Regressed(self.model, problem, regressed(replace(structure, priors=priors), problem).theta)
         except ASTRAY:
             return None
@@ -354,7 +383,8 @@ class Judge:
         refined = replace(correction, delay=delay)
         shares = self.measured(refined.applied(record), np.array(values))
         shares = self._with_departure(shares, without_delay(found))
-        return refined, replace(shares, efforts=self.efforts_left(refined.applied(record), shares.by_channel))
+        efforts = self.efforts_left(refined.applied(record), shares.by_channel)
+        return refined, replace(shares, efforts=efforts, pressures=tangent.shares.pressures)
 
     def _settled(self, tracked: TrackedRecords, now: Followed, dt: float) -> Structure:
         """Structure where a fit of an error share beside a delay ends.
