@@ -10,7 +10,7 @@ import pytest
 
 import vpm
 from places import EXAMPLES
-from test_log_check_late_reading import MODEL, STEP, turned
+from test_log_check_late_reading import MODEL, turned
 from vpm.discrepancy.parallel_candidates import Failure
 from vpm.identify import InverseDynamicsProblem, drives, response_along_motion
 from vpm.identify.following import Built
@@ -20,7 +20,6 @@ from vpm.log_check.explanation import _is_reached, _Trial
 from vpm.log_check.settings import Settings
 from vpm.log_check.shares import Judge, Shares
 from vpm.ranking import tracked_records
-from vpm.ranking.fit import Fitter
 from vpm.simulate import Setup
 
 RIG = vpm.Model.load(EXAMPLES / "servo_cylinder" / "rig.toml")
@@ -60,18 +59,6 @@ def test_pressures_that_give_what_a_motion_needs_are_in_no_other_unit() -> None:
     assert max(read.values()) < 1e-3
     assert one.doubtful(left) >= set(PRESSURES)
     assert one.doubtful(replace(left, pressures=read)) == {"axis.position"}
-
-
-def test_a_delay_that_hardly_moves_takes_no_more_derivatives(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of readings in time, beside which all has been fitted, the first secants tell that none is late."""
-    record = turned(0)
-    one, late = judge(MODEL, record), Correction(("wheel.position",), delay=0.01 * STEP)
-    tangent = one.freed(record, one.fitted(record))
-    assert tangent is not None
-    monkeypatch.setattr(Fitter, "followed", lambda *_: pytest.fail("derivatives were worked out anew"))
-    refined, left = one.fit_delay(record, late, tangent)
-    assert abs(refined.delay) < 0.25 * STEP
-    assert left.cost < tangent.shares.cost + 0.1
 
 
 def test_a_delay_is_not_refined_from_a_start_that_promises_less_than_was_reached() -> None:

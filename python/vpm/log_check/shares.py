@@ -376,7 +376,9 @@ class Judge:
             residual, slope = tracked.follow(self.model, structure.theta, tracker, [len(self.model.theta)])
             known = tangent.slopes[whole.cut : whole.cut + len(residual)]
             start = Tangent(structure, residual, np.concatenate([known, slope * longest_delay], axis=2), tangent.shares)
-            found = self._settled(tracked, start.followed(tracker), record.dt)
+            view = View(white_noise(residual, tracked.parts))
+            fitted, _ = Fitter(tracked, tracked.settings).moved(start.followed(tracker), view, anew=True)
+            found = fitted.structure
         except ASTRAY:
             return correction, self._lost(record, tangent.shares.values)
         *values, delay = found.theta.tolist()
@@ -385,24 +387,6 @@ class Judge:
         shares = self._with_departure(shares, without_delay(found))
         efforts = self.efforts_left(refined.applied(record), shares.by_channel)
         return refined, replace(shares, efforts=efforts, pressures=tangent.shares.pressures)
-
-    def _settled(self, tracked: TrackedRecords, now: Followed, dt: float) -> Structure:
-        """Structure where a fit of an error share beside a delay ends.
-
-        Derivatives cost most, see `freed`. They are worked out anew as long as the last ones moved the delay or gained
-        anything.
-        """
-        fitter, view = Fitter(tracked, tracked.settings), View(white_noise(now.residual, tracked.parts))
-        for _ in range(self.settings.steps):
-            found, _ = fitter.moved(now, view)
-            moved = abs(float(found.structure.theta[-1] - now.structure.theta[-1]))
-            after, before = (
-                self._shares(tracked, one.residual, one.tracker, one.structure.theta).cost for one in (found, now)
-            )
-            if moved < self.settings.delay_tolerance * dt and after > before + math.log(self.settings.alike):
-                break
-            now = fitter.followed(found.structure, now.tracker, now.names, found.residual)
-        return found.structure
 
     def _with_departure(self, shares: Shares, structure: Structure) -> Shares:
         """Shares with how far the parameters of the model are from what its file states."""
