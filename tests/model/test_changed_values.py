@@ -121,7 +121,7 @@ def told(model: Model) -> dict[str, object]:
     kinds = [
         name for kind in type(model).__mro__ for name, entry in vars(kind).items() if isinstance(entry, cached_property)
     ]
-    kept = {name: getattr(model, name) for name in kinds if name not in {"core", "dynamics", "theta"}}
+    kept = {name: getattr(model, name) for name in kinds if name not in {"core", "dynamics", "loops", "theta"}}
     return kept | {
         "theta": model.theta.tolist(),
         "file": model.to_toml(),
