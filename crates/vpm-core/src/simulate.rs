@@ -221,9 +221,8 @@ impl Job for Simulation<'_> {
     /// None as well where one fails, or where steps have no machine code.
     fn run_in_lanes(&self, theta: &[Twins]) -> Option<[Pair<f64>; 2]> {
         let Setting { description, stepping, interrupt, .. } = self.setting;
-        let by_values = !description.loops.is_empty()
-            || !description.balls.is_empty()
-            || description.actuators.iter().any(|actuator| actuator.drive.is_sampled());
+        let by_values =
+            !description.balls.is_empty() || description.actuators.iter().any(|actuator| actuator.drive.is_sampled());
         if by_values || stepping.method.controls_errors() {
             return None;
         }

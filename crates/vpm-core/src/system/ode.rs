@@ -119,9 +119,9 @@ impl<S: Scalar> System<S> {
         self.turn(|turning, n, hold| turning.enter(x, n, hold));
         if self.dynamics.loops.is_some() {
             self.torn = None;
-            let (gap, count) = self.close(x, 0);
-            self.independent = count;
-            self.watch(gap, count);
+            let found = self.close(x, 0, S::from_f64(f64::INFINITY));
+            self.independent = (0..S::LANES).map(|lane| equations(found[1], lane)).max().unwrap_or(0);
+            self.watch(found);
         }
     }
 
@@ -136,20 +136,20 @@ impl<S: Scalar> System<S> {
     pub(crate) fn corrected(&mut self, x: &mut [S]) {
         self.ready = false;
         if self.dynamics.loops.is_some() && self.closings[0] != self.closings[1] {
-            let (mut gap, mut count) = self.close(x, 1);
+            let mut found = self.close(x, 1, S::from_f64(f64::INFINITY));
             for _ in 0..RETURNS {
-                if gap <= OPEN {
+                if found[0].is_within(OPEN) {
                     break;
                 }
-                (gap, count) = self.close(x, 1);
+                found = self.close(x, 1, found[0]);
             }
-            self.watch(gap, count);
+            self.watch(found);
         }
     }
 
-    /// Closes all loops of the ODE's state by the way of that number. Returns what is left, and how many of their
-    /// equations count.
-    fn close(&mut self, x: &mut [S], way: usize) -> (f64, usize) {
+    /// Closes all loops of the ODE's state by the way of that number, in lanes where they are `open`. Returns what is
+    /// left, and how many of their equations count.
+    fn close(&mut self, x: &mut [S], way: usize, open: S) -> [S; 2] {
         self.ready = false;
         let moving = self.closed.len() - 2;
         let Self { closings, closed, routines, dynamics, .. } = self;
@@ -163,17 +163,20 @@ impl<S: Scalar> System<S> {
         } else {
             routines.copy(kind, x, &[], closed);
         }
-        x[..moving].copy_from_slice(&self.closed[..moving]);
-        let [gap, count] = [0, 1].map(|place| self.closed[moving + place].re());
-        (gap, count.round() as usize)
+        let most = S::from_f64(OPEN);
+        x.iter_mut().zip(&closed[..moving]).for_each(|(own, &closed)| *own = most.select_less(open, closed, *own));
+        [most.select_less(open, closed[moving], open), closed[moving + 1]]
     }
 
-    /// Notes the `gap` that closing loops left in the ODE's state, and the counted equations.
-    fn watch(&mut self, gap: f64, count: usize) {
-        if count < self.independent {
-            self.torn.get_or_insert(Trouble::Dependent(self.independent, count));
-        } else if gap > OPEN {
-            self.torn.get_or_insert(Trouble::Open(gap));
+    /// Notes the gap that closing loops left in the ODE's state, and the counted equations.
+    fn watch(&mut self, [gap, count]: [S; 2]) {
+        for lane in 0..S::LANES {
+            let (gap, count) = (gap.lane(lane), equations(count, lane));
+            if count < self.independent {
+                self.torn.get_or_insert(Trouble::Dependent(self.independent, count));
+            } else if gap > OPEN {
+                self.torn.get_or_insert(Trouble::Open(gap));
+            }
         }
     }
 
@@ -545,8 +548,8 @@ impl<S: Scalar> Ode<S> for System<S> {
 
     fn arrive(&mut self, x: &mut [S], step: Option<f64>) {
         if self.dynamics.loops.is_some() && !self.turning.is_resting() {
-            let (gap, count) = self.close(x, 0);
-            self.watch(gap, count);
+            let found = self.close(x, 0, S::from_f64(f64::INFINITY));
+            self.watch(found);
         }
         self.turn(|turning, n, hold| turning.arrive(x, n, step, hold));
     }
@@ -647,4 +650,9 @@ impl<S: Scalar> Ode<S> for System<S> {
         self.rates = values;
         true
     }
+}
+
+/// How many equations of loops count in a lane.
+fn equations<S: Scalar>(count: S, lane: usize) -> usize {
+    count.lane(lane).round() as usize
 }
