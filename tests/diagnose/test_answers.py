@@ -121,7 +121,7 @@ def test_noise_of_a_valve_is_no_structure(exact: Exact) -> None:
 def test_the_size_of_coloured_noise_is_read_off_its_quiet_part(exact: Exact) -> None:
     model, training, _ = exact
     shape = next(each for each in noise_shapes(model, training) if each is not None)
-    own, drive = shape
+    own, drive = shape.instruments, shape.drives
     generator = np.random.default_rng(3)
     n = 2 * (own.size - 1)
     spectrum = own + 40.0 * own.mean() / drive.mean() * drive

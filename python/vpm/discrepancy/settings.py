@@ -64,6 +64,8 @@ SEED, DRAWS, ENOUGH = 20160331, 6, 200
 #: Noise of commands that is sent through drives, as a share of these; share of the band over which its spectrum is
 #: smoothed; share by which parameters of drives may differ for the same one.
 COMMAND_NOISE, SMOOTHED, NEAR = 0.01, 0.08, 0.05
+#: Places of a record, and frequencies, at which a linear model tells what a machine makes of a command.
+PLACES, GRID = 5, 200
 #: Change of a reading that is rounding, in steps between numbers of its size; steps of the coarsest converters, 8 bits.
 ROUNDING, STEPS = 8.0, 256
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vpm.discrepancy.noise.noise_spectrum import noise_shapes, noise_spectrum, with_noise
+from vpm.discrepancy.noise.noise_spectrum import NoiseShape, noise_shapes, noise_spectrum, with_noise
 from vpm.discrepancy.settings import (
     ABOVE_WHITE,
     DRAWS,
@@ -72,7 +72,7 @@ def noise_floor(
     return {channel: max(*several, white.get(channel, 0.0)) for channel, several in found.items()}
 
 
-def white_level(residual: Array, moving: Array, shape: Array | None = None) -> float:
+def white_level(residual: Array, moving: Array, shape: NoiseShape | None = None) -> float:
     """Root mean square of the white noise in one channel of a residual.
 
     White noise has the same mean power at every frequency of the retained band, with an exponential distribution. So
@@ -96,7 +96,7 @@ def white_level(residual: Array, moving: Array, shape: Array | None = None) -> f
     return float(np.sqrt(RETAINED_BAND * level * n / count))
 
 
-def _white(problem: InverseDynamicsProblem, residual: Array, shapes: tuple[Array | None, ...]) -> dict[str, float]:
+def _white(problem: InverseDynamicsProblem, residual: Array, shapes: tuple[NoiseShape | None, ...]) -> dict[str, float]:
     powers: dict[str, list[tuple[float, float]]] = {}
     for block, shape in zip(problem.blocks, shapes, strict=True):
         size = white_level(residual[block.samples], block.moving, shape) / block.weight
@@ -165,7 +165,7 @@ def structure(
     return Structure(above_white, growing, new)
 
 
-def _above_white(problem: InverseDynamicsProblem, residual: Array, shapes: tuple[Array | None, ...]) -> float:
+def _above_white(problem: InverseDynamicsProblem, residual: Array, shapes: tuple[NoiseShape | None, ...]) -> float:
     """Largest ratio of any channel between its residual and the white noise in it."""
     ratios = []
     for channel in dict.fromkeys(block.channel for block in problem.blocks):
