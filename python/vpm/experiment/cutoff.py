@@ -134,11 +134,10 @@ def _expected_error(frequency: Array, motion: Array, spectrum: Array, rate: floa
     slope = differentiator_gain(frequency, rate) ** 2
     warped = np.tan(np.pi * np.minimum(frequency / rate, 0.4999))
     below = frequency <= HIGHEST * rate  # faster motion is lost at every offered cut-off
-    errors = np.empty(cutoffs.size)
-    for i, cutoff in enumerate(cutoffs):
-        kept = slope / (1.0 + (warped / np.tan(np.pi * cutoff / rate)) ** (2 * MOTION_FILTER_ORDER))
-        errors[i] = np.sum(fourth * (np.where(below, (1.0 - kept) ** 2, 0.0) * motion + kept**2 * noise))
-    return np.maximum(errors, NEGLIGIBLE**2 * float(np.sum(fourth * motion * below)))
+    order = 2 * MOTION_FILTER_ORDER
+    kept = slope / (1.0 + np.outer(np.tan(np.pi * cutoffs / rate) ** -order, warped**order))
+    errors = (1.0 - kept) ** 2 @ (fourth * motion * below) + kept**2 @ (fourth * noise)
+    return np.asarray(np.maximum(errors, NEGLIGIBLE**2 * float(np.sum(fourth * motion * below))))
 
 
 def _smooth(power: Array) -> Array:

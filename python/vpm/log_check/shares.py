@@ -7,6 +7,7 @@ from collections import OrderedDict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
+from hashlib import blake2b
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,17 +115,9 @@ class Shares:
 class _Regressed:
     """Values that leave least of the inverse-dynamics residual of a record."""
 
-    model: Model
-    problem: InverseDynamicsProblem
     values: Array
-
-    @cached_property
-    def left(self) -> dict[str, float]:
-        """What they leave of efforts, see `Shares.efforts`; nothing where links or drives diverge along the motion."""
-        try:
-            return _left_of_efforts(self.problem, self.model, self.values)
-        except ASTRAY:
-            return {}
+    #: What they leave of efforts, see `Shares.efforts`; nothing where links or drives diverge along the motion.
+    left: Mapping[str, float]
 
 
 class _Numbers:
@@ -132,13 +125,14 @@ class _Numbers:
 
     def __init__(self, record: Experiment) -> None:
         self.record = record
-        self._key = (record.channels, record.time.tobytes(), record.data.tobytes())
+        #: Digest of the numbers, in place of the record.
+        self.key = blake2b(repr(record.channels).encode() + record.time.tobytes() + record.data.tobytes()).digest()
 
     def __hash__(self) -> int:
-        return hash(self._key)
+        return hash(self.key)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Numbers) and self._key == other._key
+        return isinstance(other, _Numbers) and self.key == other.key
 
 
 class Judge:
@@ -160,6 +154,8 @@ class Judge:
         self._built: Built = OrderedDict()
         #: One record is tracked with several values in a row.
         self._tracked_of = lru_cache(KEPT)(lambda one: self._tracked_anew(one.record))
+        #: By the digest of their records: a correction is tried, and then fitted.
+        self._near: dict[bytes, _Regressed | None] = {}
 
     def measured(self, record: Experiment, values: Array | None = None) -> Shares:
         """Shares at given values of the parameters, by default those of the model, without friction that was added."""
@@ -173,7 +169,7 @@ class Judge:
 
     def efforts_left(self, record: Experiment, channels: Collection[str]) -> Mapping[str, float]:
         """What is left of the effort at each position, and of velocities among channels; see `Shares.efforts`."""
-        near = None if has_own_drives(self.model) else self._regressed(record, self._structure(record))
+        near = None if has_own_drives(self.model) else self._regressed(record)
         return self._told(record, near, channels)
 
     def _told(self, record: Experiment, near: _Regressed | None, channels: Collection[str]) -> dict[str, float]:
@@ -186,7 +182,7 @@ class Judge:
 
     def efforts_read(self, record: Experiment) -> Mapping[str, float]:
         """Such a residual also where drives have states, if the pressures of both chambers tell what they give."""
-        near = self._regressed(record, self._structure(record)) if self._tells_efforts(record) else None
+        near = self._regressed(record) if self._tells_efforts(record) else None
         return {} if near is None else {name: left for name, left in near.left.items() if name.endswith(".position")}
 
     def pressures_read(self, record: Experiment) -> Mapping[str, float]:
@@ -229,7 +225,7 @@ class Judge:
             parameter = self.model.effect(*key).parameter_names["coulomb"]
             values[self.model.index(parameter)] = structure.priors[parameter].spread
         tried = [plain, self.measured(record, values)]
-        if self._is_lost(plain) and (near := self._regressed(record, structure)) is not None:
+        if self._is_lost(plain) and (near := self._regressed(record)) is not None:
             tried.append(self.measured(record, near.values))
         return min(tried, key=lambda shares: shares.order)
 
@@ -241,7 +237,7 @@ class Judge:
         """
         structure, plain = self._structure(record), self.measured(record)
         starts, is_lost = [(structure, plain)], self._is_lost(plain)
-        near = self._regressed(record, structure) if is_lost or not has_own_drives(self.model) else None
+        near = self._regressed(record) if is_lost or not has_own_drives(self.model) else None
         pressures = self.pressures_read(record)
         if near is not None and is_lost:
             there = self.measured(record, near.values)
@@ -301,21 +297,32 @@ class Judge:
         """Whether the model as it is does not follow a record, by its ``plain`` shares."""
         return bool(plain.above(self.settings.doubtful))
 
-    def _regressed(self, record: Experiment, structure: Structure) -> _Regressed | None:
+    def _regressed(self, record: Experiment) -> _Regressed | None:
         """Values that leave least of the inverse-dynamics residual of a record, see `vpm.ranking.regression`.
 
         None where no efforts follow from the motion. Values that the model file rules out are none: commands that are
         far too small ask for masses that are.
         """
+        key = _Numbers(record).key
+        if key not in self._near:
+            self._near[key] = self._regressed_anew(record)
+        return self._near[key]
+
+    def _regressed_anew(self, record: Experiment) -> _Regressed | None:
         if why_unbalanced(self.model, [record]):
             return None
+        structure = self._structure(record)
         priors = {name: self._within(name, prior) for name, prior in structure.priors.items()}
         try:
             asked = [structure.place(name) for name in priors]
             problem = InverseDynamicsProblem(self.model, [record], first=(structure.theta, asked), built=self._built)
-            return _Regressed(self.model, problem, regressed(replace(structure, priors=priors), problem).theta)
+            values = regressed(replace(structure, priors=priors), problem).theta
         except ASTRAY:
             return None
+        try:
+            return _Regressed(values, _left_of_efforts(problem, self.model, values))
+        except ASTRAY:
+            return _Regressed(values, {})
 
     def _within(self, name: str, prior: Prior) -> Prior:
         """Prior of a parameter with bounds beyond which the model file rules values out."""
