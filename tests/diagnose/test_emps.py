@@ -69,6 +69,7 @@ def test_agrees_with_published_values() -> None:
         assert fit[name] == pytest.approx(value, rel=0.01), name
 
 
+@pytest.mark.nightly
 def test_command_line(tmp_path: Path) -> None:
     tried = [word for name in TRIED for word in ("--effect", name)]
     validation = DATA / "emps_pulses_test.csv"

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import vpm.model.model as module
+from nightly import at_night
 from places import EXAMPLES
 from vpm import demo
 from vpm.catalogue import EFFECTS
@@ -40,7 +41,7 @@ def answer(model: Model, name: str, at: str, side: str, values: dict[str, float]
     return text, other.structure, theta, list(other.parameters.items()), other.effects, other.output_channels
 
 
-@pytest.mark.parametrize("machine", MACHINES)
+@pytest.mark.parametrize("machine", at_night(MACHINES, but=("rig", "wrist")))
 def test_models_and_errors_are_those_of_the_whole_check(machine: str, monkeypatch: pytest.MonkeyPatch) -> None:
     model = Model.load(MACHINES[machine])
     cases = [

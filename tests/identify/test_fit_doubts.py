@@ -62,7 +62,7 @@ def test_a_missing_effect_is_suspected(lacking: str) -> None:
 
 
 @pytest.mark.parametrize("machine", [Axis(), Arm()], ids=["axis", "arm"])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", at_night(KINDS, but=["counted"]))
 def test_a_right_model_is_not_suspected(machine: Machine, kind: str) -> None:
     assert not any(suspects(fit) for fit in fits(machine, kind, 3, seed=20))
 

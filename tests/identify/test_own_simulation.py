@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from fit_machines import sines
+from nightly import at_night
 from runge_kutta import ahead
 from vpm import Experiment, Model, Setup, Simulation, identify
 from vpm.errors import SimulationError
@@ -123,9 +124,10 @@ def test_the_torque_constant_of_a_motor_does_not_collapse() -> None:
 SETTINGS = {"noise": Fitting(noise="estimated"), "loss": Fitting(loss="huber", starts=2)}
 
 
-@pytest.mark.parametrize("fitting", SETTINGS.values(), ids=SETTINGS)
-def test_nor_does_it_where_settings_of_the_fit_are_given(some: list[Experiment], fitting: Fitting) -> None:
+@pytest.mark.parametrize("name", at_night(SETTINGS, but=["noise"]))
+def test_nor_does_it_where_settings_of_the_fit_are_given(some: list[Experiment], name: str) -> None:
     """Of 15 intervals fewer than 11 hold the truth with a chance of 6e-4; of the inertia the residual alone has 2."""
+    fitting = SETTINGS[name]
     fits = [identify(MODEL, log, FREE, fitting=fitting) for log in some[:15]]
     held = [(fit.intervals[:, 0] <= EXPECTED) & (fit.intervals[:, 1] >= EXPECTED) for fit in fits]
     assert np.all(np.sum(held, axis=0) >= 11)

@@ -100,13 +100,17 @@ MISTAKES: dict[str, tuple[Callable[[Columns], Columns], str, tuple[str, ...], fl
 }
 
 
+#: One of each kind.
+DAILY = ("degrees", "milliampere", "divided twice", "joint turned round", "commands exchanged", "milliseconds")
+
+
 @pytest.fixture(scope="module")
 def logs() -> dict[str, Columns]:
     return {name: textbook_arm.log(arm, seed) for seed, (name, arm) in enumerate(FAULTS.items(), 1)}
 
 
 @pytest.mark.parametrize("fault", at_night(["none", "friction"], but=["none"]))
-@pytest.mark.parametrize("mistake", MISTAKES)
+@pytest.mark.parametrize("mistake", at_night(MISTAKES, but=DAILY))
 def test_names_the_mistake_of_a_log(logs: dict[str, Columns], fault: str, mistake: str) -> None:
     change, kind, channels, factor = MISTAKES[mistake]
     found = vpm.check_log(MODEL, record(change(logs[fault])), workers=1)
