@@ -80,19 +80,25 @@ def carried(model: Model) -> Part:
     return _part(model, kept, set(kept.parameter_names) & set(model.parameter_names))
 
 
-def drives_of(model: Model, joints: tuple[str, ...]) -> Drives | None:
-    """Parts of a machine that its drives are, each with the measured ``joints`` it feels.
-
-    The motor side of a joint that effects have split keeps the measured motion and the drives: these answer as in the
-    machine without such effects. None where that has other joints.
-    """
+def of_joints_alone(model: Model, joints: tuple[str, ...]) -> Model | None:
+    """A machine without the effects that give it other joints than the measured ``joints``; None where they stay."""
     bare = model
     for effect in (one for one in model.effects if one.type.motion and tuple(model.joints) != joints):
         if effect not in bare.effects:
             continue  # it went with its spring
         candidate = bare.without_effect(*effect.key)
         bare = candidate if len(candidate.joints) < len(bare.joints) else bare
-    if tuple(bare.joints) != joints:
+    return bare if tuple(bare.joints) == joints else None
+
+
+def drives_of(model: Model, joints: tuple[str, ...]) -> Drives | None:
+    """Parts of a machine that its drives are, each with the measured ``joints`` it feels.
+
+    The motor side of a joint that effects have split keeps the measured motion and the drives: these answer as in the
+    machine without such effects. None where that has other joints.
+    """
+    bare = of_joints_alone(model, joints)
+    if bare is None:
         return None
     bare = bare.at("rigid") if bare.beams else bare
     parts = tuple(_drives(bare, model, group) for group in _groups(bare))

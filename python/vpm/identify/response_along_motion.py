@@ -16,7 +16,7 @@ from vpm.errors import CoreError, DivergedError, SimulationError
 from vpm.experiment import Experiment, Motion
 from vpm.identify.drives import first_drives, picked, shown_and_efforts
 from vpm.identify.following import Following, Pair
-from vpm.identify.parts import Bending, Drives, Part, bending, carried, drives_of, whole
+from vpm.identify.parts import Bending, Drives, Part, bending, carried, drives_of, of_joints_alone, whole
 from vpm.initial import whole_motion
 from vpm.model import Model
 from vpm.numbers import Array
@@ -103,7 +103,7 @@ def free_beside_drive(model: Model, joints: Sequence[str]) -> tuple[list[str], s
     """
     if not has_hidden(model, joints):
         return None
-    apart = drives_of(model, tuple(joints)) is not None
+    apart = of_joints_alone(model, tuple(joints)) is not None
     for name in model.actuators:
         if model.line_of_actuator(name) is not None or not (apart or model.follows_command(name)):
             hidden = [beam for beam in model.beams if model.levels[beam] != "rigid"]
