@@ -109,6 +109,38 @@ def test_what_tells_no_joint_stays_or_is_refused() -> None:
         joints_from_lengths(record(1e3 * length(MOVED), model), model)
 
 
+BEAM = """
+    [beams.jib]
+    parent = "{parent}"
+    length = 1.0
+    level = "{level}"
+    deforms = ["bending_y"]
+    material = {{ young = 2e11, density = 7850.0 }}
+    section = {{ shape = "rectangle", width = 0.05, height = 0.05 }}
+    [bodies.hook]
+    mass = 5.0
+    [joints.flange]
+    type = "fixed"
+    parent = "jib"
+    child = "hook"
+"""
+
+
+@pytest.mark.parametrize("level", ["rigid", "strain(2)"])
+def test_a_link_that_bends_beyond_the_cylinder_changes_nothing(level: str) -> None:
+    model = boom(BEAM.format(parent="stick", level=level))
+    told = joints_from_lengths(record(length(MOVED), model), model)
+    np.testing.assert_allclose(told["foot.position"], MOVED, atol=1e-7)
+
+
+def test_a_length_across_a_link_that_bends_tells_no_joint() -> None:
+    line = '[lines.rope]\nfrom = { parent = "world", point = [3.0, 0.0, 3.0] }\nto = { parent = "jib" }\n'
+    for level, tells in (("rigid", True), ("strain(2)", False)):
+        model = boom(BEAM.format(parent="boom", level=level) + line)
+        log = Experiment.from_arrays(TIME, {"rope.length": 4.0 + 0.01 * np.sin(TIME)}, model=model)
+        assert (joints_from_lengths(log, model) is log) is not tells
+
+
 def test_a_run_starts_where_the_cylinder_is() -> None:
     model = boom()
     run = vpm.simulate(model, record(length(MOVED), model))

@@ -3,6 +3,7 @@
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -55,10 +56,12 @@ def lines_that_tell(experiment: Experiment, model: Model) -> dict[str, str]:
     """Logged lines whose lengths tell joints without a position, by joint."""
     lacking = [joint for joint in model.joints if f"{joint}.position" not in experiment]
     logged = [line for line in model.lines if f"{line}.length" in experiment]
-    if not lacking or not logged or len(model.coordinates) > len(model.joints):
+    if not lacking or not logged:
         return {}
     found: dict[str, str] = {}
     for line in logged:
+        if _bends(model, line):
+            continue
         moved = [joint for joint in model.joints if _moves(model, line, joint)]
         if len(moved) == 1 and moved[0] in lacking:
             found.setdefault(moved[0], line)
@@ -163,10 +166,25 @@ def _lengths(model: Model, line: str, joint: str, places: Array) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _bones(model: Model, line: str) -> Model:
-    """Bodies and joints of a model, with both ends of a line as markers."""
+def _bends(model: Model, line: str) -> bool:
+    """Whether a link that bends lies between the ends of a line."""
     content = model.to_dict()
+    joints = {joint["child"]: joint for joint in content["joints"].values()}
+
+    def links(place: dict[str, Any]) -> set[tuple[str, float | None]]:
+        on = {(place["parent"], place.get("at"))} if model.levels.get(place["parent"], "rigid") != "rigid" else set()
+        mounted = joints.get(place["parent"], content.get("beams", {}).get(place["parent"]))
+        return on if mounted is None else on | links(mounted)
+
+    ends = content["lines"][line]
+    return links(ends["from"]) != links(ends["to"])
+
+
+@lru_cache(maxsize=64)
+def _bones(model: Model, line: str) -> Model:
+    """Bodies, joints and rigid links of a model, with both ends of a line as markers."""
+    content = (model.at("rigid") if model.beams else model).to_dict()
     ends = (content["lines"][line][end] for end in ("from", "to"))
-    places = ({"parent": end["parent"], "translation": end.get("point", [0.0, 0.0, 0.0])} for end in ends)
-    kept = {key: content[key] for key in ("name", "gravity", "bodies", "joints")}
+    places = ({{"point": "translation"}.get(key, key): value for key, value in end.items()} for end in ends)
+    kept = {key: part for key, part in content.items() if key in {"name", "gravity", "bodies", "joints", "beams"}}
     return Model.from_dict({**kept, "markers": dict(zip(("start", "end"), places, strict=True))})
