@@ -112,6 +112,7 @@ ROWS = [(10 * k, 0.5 * k, -k) for k in range(12)]
         ("t q  u\n", "  "),
         ("t|q|u\n", "|"),
         ("// a log\nt;q;u\n[ms];(mm);V\n", ";"),
+        ("; a log\nt;q;u\nms;mm;V\n", ";"),
         ("t\tq\tu\n\nms\tmm\t-\n\n", "\t"),
     ],
 )

@@ -15,7 +15,7 @@ from vpm.units import is_unit
 #: Separators that are looked for; where a file has none of them, blanks separate.
 DELIMITERS = (",", ";", "\t", "|")
 #: What a line begins with that is a remark.
-REMARKS = ("#", "%", "//")
+REMARKS = ("#", "%", "//", ";")
 #: Lines and bytes in which the names have to be found.
 PREAMBLE, MOST_BEFORE = 1000, 1 << 20
 #: Bytes of no text: what controls terminals and printers, but for tabulators, ends of lines and of pages.
