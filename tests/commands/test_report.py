@@ -234,7 +234,9 @@ def test_an_effect_that_made_it_worse_is_not_said_to_take(diagnosis: vpm.Diagnos
     assert took(replace(effect, gain=0.25)).startswith("took 25.00 % of the validation mean square")
     assert took(replace(effect, gain=-0.25)).startswith("added 25.00 % to the validation mean square")
     assert took(replace(effect, gain=0.25, score=3.0)).endswith("(3.0 standard deviations)")
-    assert took(replace(effect, gain=-0.04, score=0.6)).endswith("(0.6 standard deviations, no more than chance)")
+    hidden = replace(effect, gain=-0.04, score=0.6)
+    assert took(hidden).endswith("(0.6 standard deviations, no more than chance)")
+    assert took(hidden, [effect]).endswith(f"no more than chance while {effect.label} was missing)")
 
 
 def test_page_says_where_it_comes_from(page: str, diagnosis: vpm.Diagnosis, tmp_path: Path) -> None:

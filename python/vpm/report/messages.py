@@ -1,5 +1,6 @@
 """What the page and the terminal say alike: how sure a value is, what an effect took, where the steps stand."""
 
+from collections.abc import Sequence
 from math import isfinite, isnan
 
 from vpm.discrepancy import AcceptedEffect, Diagnosis, Step
@@ -45,13 +46,14 @@ def undetermined(value: float, std: float, stated: float | None = None) -> str:
     return ""
 
 
-def took(effect: AcceptedEffect) -> str:
-    """Message on what an effect did to the validation error when it came in."""
+def took(effect: AcceptedEffect, later: Sequence[AcceptedEffect] = ()) -> str:
+    """Message on what an effect did to the validation error when it came in, while ``later`` ones were missing."""
     if isnan(effect.gain):
         return "was not measured on validation records"
     did = "took" if effect.gain >= 0.0 else "added"
     ending = "of the validation mean square" if effect.gain >= 0.0 else "to the validation mean square"
-    chance = ", no more than chance" if effect.score < NORMAL_95_ONE_SIDED else ""
+    beside = f" while {' and '.join(one.label for one in later)} {'was' if len(later) == 1 else 'were'} missing"
+    chance = f", no more than chance{beside if later else ''}" if effect.score < NORMAL_95_ONE_SIDED else ""
     return f"{did} {percent(abs(effect.gain))} {ending} ({effect.score:.1f} standard deviations{chance})"
 
 

@@ -32,7 +32,7 @@ def _verdict(d: Diagnosis) -> list[str]:
 def _effects(d: Diagnosis) -> list[str]:
     lines = [f"effects, {d.order}:"] if d.effects else []
     for number, effect in enumerate(d.effects, 1):
-        lines.append(f"  {number}. {effect.label}: {took(effect)}")
+        lines.append(f"  {number}. {effect.label}: {took(effect, d.effects[number:])}")
         lines += [f"       {text}" for text in (probability(effect),) if text]
         lines += [f"       {p.dotted} = {estimate(p.value, p.std, p.unit)}" for p in effect.parameters]
         lines += [f"       {note}" for note in effect.notes]
