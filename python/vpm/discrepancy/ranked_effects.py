@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from vpm.ranking import Ranked, Ranking
     from vpm.ranking import Settings as RankingSettings
 
+#: Why a residual says nothing of a spring that was loaded before its record: it begins without memory.
+REMEMBERED = "nobody knows what the spring at {site} remembers of the motion before each record"
 #: Part of the name of a parameter that acts behind a joint that is split.
 BEHIND = ".link."
 
@@ -81,7 +83,7 @@ def found_by(
 
     Ctrl-C gives the effects that were refitted until then; before the first one was, it raises.
 
-    Raises NoResidualError: no efforts can be computed with an effect that was ranked.
+    Raises NoResidualError: no efforts can be computed with an effect that was ranked, or they know not how it began.
     """
     known: tuple[Rivals, ...] = ()
 
@@ -89,6 +91,8 @@ def found_by(
         return candidates(final.model, data.training, final.fit.residual, asked_for(effects))
 
     def beside(current: Judged, model: Model, one: Ranked) -> Measured:
+        if EFFECTS[one.effect].memory and one.site in model.added_joints:
+            raise NoResidualError(REMEMBERED.format(site=one.site))
         try:
             return _beside(current, model, one, data)
         except VpmError as error:

@@ -517,6 +517,8 @@ class TrackedRecords:
         gains[:, :, [name not in self.drawn_to for name in channels]] = 0.0
         bent = self._bending(model, record, channels, start)
         gains[: len(bent)] += bent
+        first = min(int(self.settings.settling / record.dt), len(record.time) // 2)
+        gains[:first] += memory_gains(model, channels, bands, (first, record.dt), theta)
         return gains.reshape(len(record.time), -1)
 
 
@@ -601,6 +603,33 @@ def tracker_gains(
         factor = _factor(model, channel, theta)
         gains[:, places, column] = slow / factor
         gains[: len(count), places, column] = np.clip(_gains_of_line(channel, count, dt)[:, own], slow, quick) / factor
+    return gains
+
+
+def memory_gains(
+    model: Model, channels: Sequence[str], bands: tuple[float, float], grid: tuple[int, float], theta: Array
+) -> Array:
+    """Gains of a tracker (samples, nx, m) by which first readings of a deflection tell what its spring remembers.
+
+    Where a spring with hysteresis was left by the motion before the record, nobody knows. At rest it bends less by
+    force/stiffness for each unit of its memory. These gains draw the deflection with it, which else would swing.
+    """
+    (samples, dt), count = grid, len(model.coordinates)
+    gains = np.zeros((samples, len(model.state_names), len(channels)))
+    springs = {model.joint_behind(joint): joint for joint in model.driven_joints}
+    for effect in model.effects:
+        channel, stiffness = f"{effect.at}.position", f"{springs.get(effect.at)}.compliance.stiffness"
+        if not effect.type.memory or channel not in channels or stiffness not in model.parameters:
+            continue
+        force = theta[model.index(effect.parameter_names["force"])]
+        if force > 0.0:
+            place, column = model.coordinates.index(effect.at), channels.index(channel)
+            slow, quick = (-np.expm1(-2.0 * np.pi * band * dt) for band in bands)
+            told = np.clip(1.0 / np.arange(1.0, samples + 1.0), slow, quick)
+            gains[:, [place, count + place], column] = _gains(channel, bands[1], dt)
+            gains[:, model.state_names.index(f"{effect.at}.memory"), column] = (
+                -theta[model.index(stiffness)] / force * told
+            )
     return gains
 
 
