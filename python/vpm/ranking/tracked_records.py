@@ -619,17 +619,17 @@ def memory_gains(
     springs = {model.joint_behind(joint): joint for joint in model.driven_joints}
     for effect in model.effects:
         channel, stiffness = f"{effect.at}.position", f"{springs.get(effect.at)}.compliance.stiffness"
+        forces = [effect.parameter_names[one.name] for one in effect.type.parameters if one.scale == "effort"]
         if not effect.type.memory or channel not in channels or stiffness not in model.parameters:
             continue
-        force = theta[model.index(effect.parameter_names["force"])]
+        force = sum(theta[model.index(name)] for name in forces)
         if force > 0.0:
             place, column = model.coordinates.index(effect.at), channels.index(channel)
             slow, quick = (-np.expm1(-2.0 * np.pi * band * dt) for band in bands)
             told = np.clip(1.0 / np.arange(1.0, samples + 1.0), slow, quick)
             gains[:, [place, count + place], column] = _gains(channel, bands[1], dt)
-            gains[:, model.state_names.index(f"{effect.at}.memory"), column] = (
-                -theta[model.index(stiffness)] / force * told
-            )
+            memory = model.state_names.index(f"{effect.at}.{effect.type.memory}")
+            gains[:, memory, column] = -theta[model.index(stiffness)] / force * told
     return gains
 
 
