@@ -133,7 +133,7 @@ def _most_allowed(model: Model, record: Experiment, m: Motion, channels: Sequenc
     samples along a prescribed motion; a mass that gives way lets less be read, see `_given_way`.
     """
     frequency = np.arange(len(drives)) / (2.0 * len(drives) * record.dt)
-    yielding = _given_way(model, record, channels, frequency)
+    yielding = _given_way(model, record, m.inputs, channels, frequency)
     most = np.full(len(channels), np.inf)
     for column, channel in enumerate(channels):
         highest = min(record.retained.get(channel, np.inf), 0.5 * record.read_rate(channel))
@@ -144,7 +144,7 @@ def _most_allowed(model: Model, record: Experiment, m: Motion, channels: Sequenc
     return most
 
 
-def _given_way(model: Model, record: Experiment, channels: Sequence[str], frequency: Array) -> Array:
+def _given_way(model: Model, record: Experiment, commands: Array, channels: Sequence[str], frequency: Array) -> Array:
     """Power of commands in channels of the free machine, over that along a prescribed motion; at most 1.
 
     Law: frequency responses of the linear model at some places of the record, and of that without its joints. At a
@@ -153,7 +153,6 @@ def _given_way(model: Model, record: Experiment, channels: Sequence[str], freque
     """
     rows = np.linspace(0, len(record) - 1, PLACES).astype(np.int64)
     grid = np.linspace(frequency[1], frequency[-1], GRID)
-    commands = np.column_stack([record[channel] for channel in model.input_channels])
     sizes = np.sqrt(np.mean(commands**2, axis=0))
     powers = np.zeros((2, GRID, len(channels)))
     try:
