@@ -655,6 +655,28 @@ def test_a_spring_keeps_its_pull_where_a_step_moves_its_rest(
     assert stiffness * place == pytest.approx(size * (rest + further) + change * rest, rel=1e-6, abs=1e-9)
 
 
+def test_a_spring_comes_back_from_where_it_pulls_nearly_the_same_everywhere() -> None:
+    """The step is as likely as where it ends: as the spring stiffens its rest goes less far than at its first size."""
+    model = Model.from_toml(SLEDGE)
+    truth = model.with_effect("spring", "way", stiffness=30.0, rest=-0.05)
+    time = 2e-3 * np.arange(4000)
+    sent = Experiment.from_arrays(
+        time, {"motor.command": 2.0 * np.sin(2.5 * time)}, model=model, name="pushed to and fro"
+    )
+    ran = vpm.simulate(truth, sent, mode="free_run")
+    read = ran["way.position"] + 1e-6 * np.random.default_rng(1).standard_normal(len(time))
+    log = Experiment.from_arrays(
+        time, {"motor.command": sent["motor.command"], "way.position": read}, model=model, name="pushed to and fro"
+    )
+    fitter, tracker = Fitter(TrackedRecords(model, [log], Settings()), Settings()), Tracker(1.0)
+    names = ("way.spring.stiffness", "way.spring.rest")
+    far = model.with_effect("spring", "way", stiffness=0.0, rest=-5.0)
+    priors = dict(zip(names, (Prior(0.0, 50.0, 0.0, np.inf), Prior(0.0, 0.1, -np.inf, np.inf)), strict=True))
+    start = Structure(far, far.theta.copy(), priors, (("spring", "way"),))
+    found = fitter.fitted(start, tracker, View(fitter.noise_of(start, tracker)))
+    assert found.structure.values == pytest.approx(dict(zip(names, (30.0, -0.05), strict=True)), rel=0.02)
+
+
 MOVES = st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3).map(np.array)
 
 

@@ -345,8 +345,8 @@ class Fitter:
     def _step(self, structure: Structure, view: View, errors: Array, slopes: Array) -> tuple[Array, float]:
         """Bounded Gauss-Newton step of a fit, and its predicted gain in nats."""
         move = bounded_step(structure, *view.weighted(errors, slopes), self.settings.reach)
-        gain, z = view.noise.cost(errors) - view.noise.cost(errors + slopes @ move), structure.standard
-        return move, gain + 0.5 * (float(z @ z) - float((z + move) @ (z + move)))
+        gain = view.noise.cost(errors) - view.noise.cost(errors + slopes @ move)
+        return move, gain + likelier(structure, move)
 
     def _tolerance(self, view: View, errors: Array, slopes: Array) -> float:
         """Gain of a step, nats, below which a fit ends: what chance makes of it.
@@ -397,9 +397,9 @@ class Fitter:
         all of them far from what is known.
         """
         weighted, slopes = view.weighted(*linear)
-        variance, z = float(np.mean(weighted**2)), now.structure.standard
+        variance = float(np.mean(weighted**2))
         move = bounded_step(now.structure, np.zeros_like(weighted), slopes, self.settings.reach, variance)
-        if 0.5 * (float(z @ z) - float((z + move) @ (z + move))) < self.settings.tolerance:
+        if likelier(now.structure, move) < self.settings.tolerance:
             return None
         tried = now.structure.moved(move)
         with contextlib.suppress(*ASTRAY):
@@ -502,6 +502,15 @@ def by_secant(slopes: Array, change: Array, move: Array) -> Array:
     """
     missed = (change - slopes @ move) / max(float(move @ move), 1e-300)
     return np.asarray(slopes + np.outer(missed, move))
+
+
+def likelier(structure: Structure, move: Array) -> float:
+    """By how much the priors make a structure likelier that was moved, nats.
+
+    Where a size grows, its place goes less far than the step of a fit says, see `Structure.moved`.
+    """
+    before, after = structure.standard, structure.moved(move).standard
+    return 0.5 * (float(before @ before) - float(after @ after))
 
 
 def free_step(errors: Array, slopes: Array, standard: Array) -> Array:
