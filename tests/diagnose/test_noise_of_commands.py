@@ -64,8 +64,8 @@ def test_a_pressure_that_wanders_is_no_noise_of_the_valve(rig: Model) -> None:
     for block, shape in zip(one.blocks, noise_shapes(rig, one), strict=True):
         if shape is not None:
             bounded, free = (
-                white_level(residual[block.samples], block.moving, one) / block.weight
-                for one in (shape, replace(shape, most=np.inf))
+                white_level(residual[block.samples], block.moving, bound) / block.weight
+                for bound in (shape, replace(shape, most=np.inf))
             )
             assert bounded < 6e5 / 3.0
             assert bounded < 0.9 * free

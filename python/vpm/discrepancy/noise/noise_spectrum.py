@@ -102,19 +102,18 @@ def _of_record(
     model: Model, problem: InverseDynamicsProblem, record: int, generator: np.random.Generator
 ) -> list[NoiseShape | None]:
     m = problem.motions[record]
-    whole = replace(m, edge=0)
-    fast = replace(whole, decimation=1)
-    clean, raw = (_shown(model, problem, record, one) for one in (whole, fast))
+    whole = replace(m, edge=0, decimation=1)
+    clean = _shown(model, problem, record, whole)
     sizes = COMMAND_NOISE * np.sqrt(np.mean(m.inputs**2, axis=0))
-    drives, read = np.zeros_like(_powers(clean)), np.zeros_like(_powers(raw))
+    drives, read = (np.zeros_like(_powers(values)) for values in (m.parallel(clean), clean))
     first = record * (len(problem.joints) + len(problem.shown)) + len(problem.joints)
     blocks = problem.blocks[first : first + len(problem.shown)]
     counted = np.column_stack([block.moving for block in blocks])
     for _ in range(DRAWS):
         noisy = whole.inputs + sizes * generator.standard_normal(whole.inputs.shape)
-        change, told = (_shown(model, problem, record, replace(one, inputs=noisy)) for one in (whole, fast))
-        drives += _powers((change - clean) * counted) / DRAWS
-        read += _powers(told - raw) / DRAWS
+        change = _shown(model, problem, record, replace(whole, inputs=noisy)) - clean
+        drives += _powers(m.parallel(change) * counted) / DRAWS
+        read += _powers(change) / DRAWS
     own = _of_instruments(model, problem, record, generator)
     most = _most_allowed(model, problem.experiments[record], m, [block.channel for block in blocks], read)
     shapes: list[NoiseShape | None] = [None] * len(problem.joints)
@@ -208,8 +207,7 @@ def with_noise(model: Model, log: Experiment, read: Experiment, generator: np.ra
 
 
 def _shown(model: Model, problem: InverseDynamicsProblem, record: int, whole: Motion) -> Array:
-    filtered = whole if whole.decimation == 1 else problem.motions[record]
-    known = Following(filtered.parallel, problem.integrators[record])
+    known = Following(whole.parallel, problem.integrators[record])
     return respond(model, model.theta, whole, problem.experiments[record], (), problem.shown, known).seen
 
 
