@@ -862,3 +862,26 @@ def test_an_effect_is_as_large_as_in_the_channel_where_it_does_more_than_errors_
     look.explained = np.where(np.arange(2) == position, 1e8, 10.0)
     left = np.where(np.arange(2) == position, 0.3, 0.6)
     assert look.judged(replace(fitted, residual=left * fitted.residual)).size > 0.1
+
+
+@pytest.mark.parametrize(
+    ("added", "words"),
+    [
+        (0.03, "it adds 3 % to the error power"),
+        (9.0, "it makes the error power more than 10 times as large"),
+        (4.21e23, "it makes the error power more than 10 times as large"),
+    ],
+)
+def test_errors_that_grow_beyond_measure_are_told_without_their_digits(added: float, words: str) -> None:
+    told = Judgement(-added, -added, 0.0, 0.1, 0.1, 0.1)
+    assert told.lacks(Settings()).startswith(words)
+
+
+def test_harm_to_validation_records_is_told_the_same_way() -> None:
+    told = Judgement(0.9, 0.9, 9.0, 0.1, 0.1, 0.1)
+    assert replace(told, refuted=0.5).lacks(Settings()).endswith("but adds 50 % to that of validation records")
+    assert (
+        replace(told, refuted=1e9)
+        .lacks(Settings())
+        .endswith("makes that of validation records more than 10 times as large")
+    )

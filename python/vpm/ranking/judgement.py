@@ -9,6 +9,9 @@ from vpm.numbers import rough_percent
 from vpm.ranking.settings import Settings
 from vpm.results import Storable
 
+#: Error powers above this many times what they were say no more than that it does harm.
+MANY = 10.0
+
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Judgement(Storable):
@@ -68,7 +71,7 @@ class Judgement(Storable):
         """Text of a judgement: ``removes 3 % of the error power``, or adds it where the share is negative."""
         share = round(self.least, 4)  # beyond that is what fits end with
         if share < 0.0:
-            return f"adds {rough_percent(-share)} to the error power"
+            return _adding(-share, "the error power")
         return f"removes {rough_percent(abs(share))} of the error power"
 
     def counts(self, settings: Settings) -> bool:
@@ -91,7 +94,7 @@ class Judgement(Storable):
     def lacks(self, settings: Settings) -> str:
         """Text on what a judgement lacks to count; "" where it counts."""
         if self.refuted:
-            return f"it {self.words}, but adds {rough_percent(self.refuted)} to that of validation records"
+            return f"it {self.words}, but {_adding(self.refuted, 'that of validation records')}"
         if self.least <= settings.worth:
             return f"it {self.words}; {rough_percent(settings.worth)} have to go"
         if not self.is_repeated(settings):
@@ -130,3 +133,10 @@ class Judgement(Storable):
         if self.apart:
             return f"it {self.words}, but its contacts never meet: their roundings act as a spring"
         return ""
+
+
+def _adding(share: float, what: str) -> str:
+    """Text on a judgement of what makes errors larger: ``adds 3 % to the error power``."""
+    if share >= MANY - 1.0:
+        return f"makes {what} more than {MANY:g} times as large"
+    return f"adds {rough_percent(share)} to {what}"
