@@ -13,8 +13,9 @@ import pytest
 import vpm
 from vpm.demo import MODEL, TRAIN, VALIDATION
 from vpm.discrepancy.diagnosis import RefusedEffect
+from vpm.identify import Combination
 from vpm.numbers import percent, short
-from vpm.report.messages import estimate, took
+from vpm.report.messages import estimate, refitted, took
 from vpm.report.story import print_story
 
 HTML, SVG = "{http://www.w3.org/1999/xhtml}", "{http://www.w3.org/2000/svg}"
@@ -227,6 +228,17 @@ def test_a_value_within_its_deviation_is_called_undetermined() -> None:
     assert "change undetermined: within its deviation of the model file's 0.45" in estimate(0.5, 0.1, "N", 0.45)
     assert "undetermined" not in estimate(0.5, 0.1, "N", 0.2)
     assert estimate(0.5, 0.0, "1") == "0.5 (held)"
+
+
+def test_a_value_without_a_deviation_is_said_to_show_with_others_or_in_no_effort(diagnosis: vpm.Diagnosis) -> None:
+    fit = diagnosis.fit
+    first, second = [name for name in fit.names if name in diagnosis.stated][:2]
+    unsure = replace(fit, std=np.full_like(fit.std, np.inf), unidentifiable=(Combination((first, second), (1, 2), 0.0),))
+    told = {name: said for name, _, said in refitted(replace(diagnosis, fit=unsure))}
+    assert told[first].endswith(f"undetermined: the efforts show it only together with {second}")
+    alone = replace(unsure, unidentifiable=(Combination((first,), (1,), 0.0),))
+    told = {name: said for name, _, said in refitted(replace(diagnosis, fit=alone))}
+    assert told[first].endswith("undetermined: the efforts do not show it")
 
 
 def test_an_effect_that_made_it_worse_is_not_said_to_take(diagnosis: vpm.Diagnosis) -> None:

@@ -16,7 +16,9 @@ VERDICT_WORDS = {
 }
 
 
-def estimate(value: float, std: float, unit: str, stated: float | None = None) -> str:
+def estimate(
+    value: float, std: float, unit: str, stated: float | None = None, unseen: str = "the records do not show it"
+) -> str:
     """Message on an estimate, ``0.55 ± 0.01 N m``, and whether it differs from zero and the model file.
 
     Parameters
@@ -25,20 +27,22 @@ def estimate(value: float, std: float, unit: str, stated: float | None = None) -
         A deviation of zero stands for a value that was held.
     stated : float, optional
         Value of the model file; None for what the file does not have.
+    unseen : str
+        Why a deviation is infinite.
     """
     shown = f" {unit}" if unit != "1" else ""
     if not std > 0.0:
         return f"{short(value)}{shown} (held)" if std == 0.0 else f"{short(value)}{shown} (deviation unknown)"
     spread = f" ± {std:.2g}" if isfinite(std) else ""
-    return f"{short(value)}{spread}{shown}{undetermined(value, std, stated)}"
+    return f"{short(value)}{spread}{shown}{_undetermined(value, std, stated, unseen)}"
 
 
-def undetermined(value: float, std: float, stated: float | None = None) -> str:
+def _undetermined(value: float, std: float, stated: float | None, unseen: str) -> str:
     """Message ``, undetermined: ...`` for a value within its deviation of zero or the file's, or ""."""
     if not std > 0.0:
         return ""
     if not isfinite(std):
-        return ", undetermined: the records do not show it"
+        return f", undetermined: {unseen}"
     if abs(value) <= std:
         return ", undetermined: within its deviation of zero"
     if stated is not None and abs(value - stated) <= std:
@@ -85,6 +89,14 @@ def refitted(d: Diagnosis) -> list[tuple[str, str, str]]:
     rows = []
     for name, value, std, unit in zip(d.fit.names, d.fit.values, d.fit.std, d.fit.units, strict=True):
         if name in d.stated:
-            said = estimate(float(value), float(std), unit, d.stated[name])
+            said = estimate(float(value), float(std), unit, d.stated[name], _unseen(d, name))
             rows.append((name, f"{short(d.stated[name])} {unit if unit != '1' else ''}".strip(), said))
     return rows
+
+
+def _unseen(d: Diagnosis, name: str) -> str:
+    """Message on why the last fit of a diagnosis has no deviation of a parameter: what showed it tells nothing alone."""
+    shown = "efforts" if d.fit.mode == "inverse_dynamics" else "records"
+    together = [one.names for one in d.fit.unidentifiable if name in one.names]
+    others = list(dict.fromkeys(other for names in together for other in names if other != name))
+    return f"the {shown} show it only together with {', '.join(others)}" if others else f"the {shown} do not show it"
