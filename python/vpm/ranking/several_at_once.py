@@ -72,7 +72,7 @@ def _does_better(trials: Trials, trial: Trial, best: Trial) -> bool:
 
 
 def _alike(trials: Trials, tried: Sequence[Trial], most: int) -> list[Trial]:
-    """Fits of one effect at several places together, ``most`` effects at a time, by the error that they leave.
+    """Fits of one effect at several places together, ``most`` effects at a time, the best first.
 
     Joints that move each other hide such an effect from each other. A command that is delayed at one drive alone would
     need a force at the next drive that no log holds.
@@ -93,7 +93,17 @@ def _alike(trials: Trials, tried: Sequence[Trial], most: int) -> list[Trial]:
         )
 
     ends = trials.each("fitting at several places", one_fitted, groups, lambda group: group[0].key[0])
-    return sorted((end for end in ends if isinstance(end, Trial)), key=lambda end: end.left)
+    return _plainest_first([end for end in ends if isinstance(end, Trial)])
+
+
+def _plainest_first(ends: Sequence[Trial]) -> list[Trial]:
+    """Fits at several places by the error that they leave, but the plainest first of those as good as the best.
+
+    A contact whose play shrinks to nothing is a spring: with more numbers it leaves as little.
+    """
+    ordered = sorted(ends, key=lambda end: end.left)
+    alike = [end for end in ordered if end.look is ordered[0].look and as_good(end, ordered[0], end.look.settings)]
+    return [*sorted(alike, key=lambda end: end.order), *(end for end in ordered if end not in alike)]
 
 
 def _joined(group: Sequence[Trial]) -> Structure:
