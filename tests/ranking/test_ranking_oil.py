@@ -82,8 +82,19 @@ def test_records_tell_how_fast_pressures_are_drawn(drive: float, gauge: float, b
     """Noise of a drive is in the machine, and followed; that of gauges is not."""
     record = logged(rig(), currents(), 1, drive=drive, gauge=gauge)
     search = Search(rig(), [record], [], Settings(), None, ParallelCandidates(1, None), lambda _: None)
-    search.draw_pressures()
+    search.draw_pressures(search.start)
     assert search.fitter.tracked.of_pressures == band
+
+
+def test_pressures_are_drawn_anew_once_a_leak_was_found() -> None:
+    """Gauges of so much noise tell more than a model does that misses the leak, and less than the one that has it."""
+    model, tried = rig(), ["internal_leakage"]
+    record = logged(model.with_effect("internal_leakage", "servo", coefficient=1e-11), currents(), 2, gauge=6e3)
+    search = Search(model, [record], tried, Settings(), None, ParallelCandidates(1, None), lambda _: None)
+    search.draw_pressures(search.start)
+    assert search.fitter.tracked.of_pressures == 10.0
+    assert [one.effect for one in search.run().effects] == tried
+    assert search.fitter.tracked.of_pressures == 1.0
 
 
 def test_what_noise_of_gauges_does_to_a_piston_is_not_missing() -> None:

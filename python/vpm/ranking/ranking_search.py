@@ -83,6 +83,7 @@ class Search(Trials):
                     break
                 if best is not None and present:
                     looks = self._out_of_a_dead_end(best, looks)
+                looks = self._drawn_anew(looks)
             if set(named) - begun:
                 looks, rounds = self._plainer(looks, rounds, named)
         except KeyboardInterrupt:
@@ -96,10 +97,21 @@ class Search(Trials):
     def _first_looks(self) -> list[Look]:
         """Looks of the search at the model as it was, with what is uncertain fitted."""
         self.say("fitting what is uncertain")
-        self.draw_pressures()
+        self.draw_pressures(self.start)
         looks = self.looks(self.start)
         self.first = {look.fitted.tracker.band: look for look in looks}
         return looks
+
+    def _drawn_anew(self, looks: list[Look]) -> list[Look]:
+        """Looks of the search with pressures as what was found draws them.
+
+        While a leak was missing readings told pressures better than the model did, however much noise they pass on.
+        """
+        fitted = self.draw_pressures(looks[0].fitted.structure)
+        if fitted is None:
+            return looks
+        self.first = {look.fitted.tracker.band: look for look in self.looks(self.start)}
+        return self.all_looks(self.look(fitted))
 
     def _plainer(
         self, looks: list[Look], rounds: list[tuple[Ranked, ...]], named: dict[_Place, Ranked]

@@ -68,23 +68,32 @@ class Trials:
         self.rubbing: Structure | None = None  # with the usual friction of several joints that lack it
         self.others: dict[Key, list[Structure]] = {}  # what counted as well when an effect came in
 
-    def draw_pressures(self) -> None:
-        """Draw pressures, in all trials, with the bandwidth under which the records are most probable.
+    def draw_pressures(self, structure: Structure) -> Fitted | None:
+        """Draw pressures, in all trials, with the bandwidth under which a structure makes the records most probable.
 
         Pressures that are drawn too slowly are what the model makes of noise of its drive, and those that are drawn too
         fast pass on noise of gauges. Either pushes the joints, and shows at the gauges. The least error would be
         another choice: slow ones hide a missing force, for oil that gives way takes it.
+
+        The result is the structure as it was fitted, if the bandwidth is another one than before.
         """
-        tracked = self.fitter.tracked
-        if tracked.drawn_to == tracked.drawn_joints:
-            return
-        told: list[tuple[float, Fitter]] = []
+        was = self.fitter
+        if was.tracked.drawn_to == was.tracked.drawn_joints:
+            return None
+        told: list[tuple[float, Fitter, Fitted]] = []
         for band in OF_PRESSURES:
-            self.fitter = Fitter(tracked.with_pressures(band), self.settings)
+            self.fitter = Fitter(was.tracked.with_pressures(band), self.settings)
             with contextlib.suppress(*ASTRAY):
-                fitted = self.fitted(self.start, Tracker(self.settings.bands[0]))
-                told.append((self.predictive_density(fitted), self.fitter))
-        _, self.fitter = max(told, key=lambda one: one[0], default=(0.0, Fitter(tracked, self.settings)))
+                fitted = self.fitted(structure, Tracker(self.settings.bands[0]))
+                told.append((self.predictive_density(fitted), self.fitter, fitted))
+        if not told:
+            self.fitter = was
+            return None
+        _, self.fitter, fitted = max(told, key=lambda one: one[0])
+        if self.fitter.tracked.of_pressures != was.tracked.of_pressures:
+            return fitted
+        self.fitter = was
+        return None
 
     def looks(self, structure: Structure, known: Look | None = None) -> list[Look]:
         """Looks of the search at a structure under each tracker that can follow it.
