@@ -233,10 +233,11 @@ def test_a_value_within_its_deviation_is_called_undetermined() -> None:
 def test_a_value_without_a_deviation_is_said_to_show_with_others_or_in_no_effort(diagnosis: vpm.Diagnosis) -> None:
     fit = diagnosis.fit
     first, second = [name for name in fit.names if name in diagnosis.stated][:2]
-    unsure = replace(fit, std=np.full_like(fit.std, np.inf), unidentifiable=(Combination((first, second), (1, 2), 0.0),))
+    both = Combination((first, second), (1.0, 2.0), 0.0)
+    unsure = replace(fit, std=np.full_like(fit.std, np.inf), unidentifiable=(both,))
     told = {name: said for name, _, said in refitted(replace(diagnosis, fit=unsure))}
     assert told[first].endswith(f"undetermined: the efforts show it only together with {second}")
-    alone = replace(unsure, unidentifiable=(Combination((first,), (1,), 0.0),))
+    alone = replace(unsure, unidentifiable=(Combination((first,), (1.0,), 0.0),))
     told = {name: said for name, _, said in refitted(replace(diagnosis, fit=alone))}
     assert told[first].endswith("undetermined: the efforts do not show it")
 

@@ -1,5 +1,6 @@
 """Deviations of what records show only together, where the model file states one of it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -45,6 +46,16 @@ def test_where_positions_show_ratios_alone_all_are_as_sure_as_the_stated_mass(st
     found = standing(model, data, NAMES)
     assert np.all(np.isinf(found.std))
     np.testing.assert_allclose(beside_stated(found, model, data).std / found.values, expected, rtol=0.02)
+
+
+def test_what_records_show_worse_than_the_file_is_as_sure_as_the_file() -> None:
+    """Noise passes for a trace of the gain, so that records alone tell all three to some 60 %."""
+    model = vpm.Model.from_toml(SLIDE.format(mass=0.1))
+    data = comparison(model, [swung(model)], "free_run")
+    found, random = standing(model, data, NAMES), np.random.default_rng(2)
+    trace = 1e-2 * np.std(found.residual) * random.standard_normal(len(found.residual))
+    weak = replace(found, jacobian=found.jacobian + np.outer(trace, [0.0, 1.0, 0.0]), unseen=())
+    np.testing.assert_allclose(beside_stated(weak, model, data).std / found.values, 0.05, rtol=0.02)
 
 
 @pytest.mark.parametrize(("stated", "expected"), [(0.1, 0.05), ("inf", np.inf)])

@@ -6,7 +6,6 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import qr
 from scipy.optimize import least_squares, lsq_linear
 
 from vpm.identify.identifiability import (
@@ -178,24 +177,11 @@ def standing(model: Model, data: Problem, free: Sequence[str]) -> Estimate:
 
 
 def beside_stated(found: Estimate, model: Model, data: Problem) -> Estimate:
-    """Estimate with deviations of what the records show only together, from what the model states of it.
+    """Estimate with deviations that the records and what the model states make together, as values that weigh both.
 
-    Along each unidentifiable combination one parameter is taken as known, the best stated one for its weight, and its
-    uncertainty moves the others along. Where nothing is stated deviations stay infinite.
+    Where neither tells anything deviations stay infinite.
     """
-    stated = [model.parameters[name].uncertainty or np.inf for name in found.names]
-    weights = [dict(zip(one.names, one.weights, strict=True)) for one in found.unseen]
-    along = np.array([[one.get(name, 0.0) for one in weights] for name in found.names]).reshape(len(stated), -1)
-    _, triangle, order = qr((along / np.array(stated)[:, None]).T, mode="economic", pivoting=True)
-    known = order[: len(weights)]
-    if not weights or len(known) < len(weights) or np.any(np.diag(triangle) == 0.0):
-        return found
-    seen = np.setdiff1d(np.arange(len(stated)), known)
-    covariance = np.zeros_like(found.covariance)
-    names = [found.names[place] for place in seen]
-    covariance[np.ix_(seen, seen)] = _covariance(data, found.residual, found.jacobian[:, seen], (), names)
-    moved = along @ np.linalg.inv(along[known]) * np.array(stated)[known]
-    return replace(found, covariance=covariance + moved @ moved.T)
+    return replace(found, covariance=_with_stated(found.names, model, data, found.residual, found.jacobian))
 
 
 def beside_held(found: Estimate, model: Model, data: Problem, held: Sequence[str]) -> Estimate:
@@ -208,12 +194,7 @@ def beside_held(found: Estimate, model: Model, data: Problem, held: Sequence[str
     columns = [model.index(name) for name in names]
     residual, jacobian = data.evaluate(model, model.theta, columns)
     lengths = column_lengths(jacobian := above_rounding(jacobian, model, columns))
-    told = information_root(jacobian / lengths, residual, segments(data)) * lengths
-    stated = [1.0 / (model.parameters[name].uncertainty or np.inf) for name in names]
-    rows = np.vstack([told, np.diag(stated)])
-    scales = column_lengths(rows)
-    spread = np.linalg.pinv(rows / scales) / scales[:, None]
-    covariance = blinded(spread @ spread.T, unseen_combinations(rows, names), names)
+    covariance = _with_stated(names, model, data, residual, jacobian)
     blind = np.flatnonzero(~np.isfinite(np.diag(covariance)))
     own, others = np.split(jacobian / lengths, [first], axis=1)
     along = -np.linalg.lstsq(own, others, rcond=None)[0] * lengths[first:] / lengths[:first, None]
@@ -223,6 +204,16 @@ def beside_held(found: Estimate, model: Model, data: Problem, held: Sequence[str
     )
     covariance[blind, blind] = np.inf
     return replace(found, names=tuple(names), values=model.theta[columns], jacobian=jacobian, covariance=covariance)
+
+
+def _with_stated(names: Sequence[str], model: Model, data: Problem, residual: Array, jacobian: Array) -> Array:
+    """Covariance of an estimation from the records and the uncertainties that the model states, infinite of neither."""
+    lengths = column_lengths(jacobian)
+    told = information_root(jacobian / lengths, residual, segments(data)) * lengths
+    rows = np.vstack([told, np.diag([1.0 / (model.parameters[name].uncertainty or np.inf) for name in names])])
+    scales = column_lengths(rows)
+    spread = np.linalg.pinv(rows / scales) / scales[:, None]
+    return blinded(spread @ spread.T, unseen_combinations(rows, names), names)
 
 
 class _Counter:

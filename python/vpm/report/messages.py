@@ -95,7 +95,7 @@ def refitted(d: Diagnosis) -> list[tuple[str, str, str]]:
 
 
 def _unseen(d: Diagnosis, name: str) -> str:
-    """Message on why the last fit of a diagnosis has no deviation of a parameter: what showed it tells nothing alone."""
+    """Message on why the last fit of a diagnosis has no deviation of a parameter."""
     shown = "efforts" if d.fit.mode == "inverse_dynamics" else "records"
     together = [one.names for one in d.fit.unidentifiable if name in one.names]
     others = list(dict.fromkeys(other for names in together for other in names if other != name))
