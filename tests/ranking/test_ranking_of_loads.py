@@ -7,9 +7,12 @@ from sledge import MASS, pushed
 from vpm import EFFECTS, Model, rank
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.experiment import Experiment
+from vpm.ranking.fit import Fitted
+from vpm.ranking.model_structure import Structure
 from vpm.ranking.ranking_search import Search
 from vpm.ranking.result import Ranking
 from vpm.ranking.settings import Settings
+from vpm.ranking.tracked_records import Tracker
 
 #: Stated uncertainty of the sledge's mass, kg.
 UNCERTAIN = 0.05
@@ -60,3 +63,21 @@ def test_no_load_is_asked_for_where_a_fit_by_another_tracker_stays_by_the_file(l
     assert load.key == ("payload", "sledge")
     near = search.look(search.fitter.unfitted(search.start, far[0].fitted.tracker))
     assert search._load([*far, near]) is None
+
+
+def test_a_load_that_explains_no_more_is_fitted_once_under_each_tracker(
+    logs: list[Experiment], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Only one that does may have stopped where the fit without it would go on."""
+    search = Search(described(2.0), logs[:1], tuple(EFFECTS), Settings(), None, ParallelCandidates(1), lambda _: None)
+    far, fits, own = search.looks(search.start), list[Fitted](), search.fitted
+
+    def counted(structure: Structure, tracker: Tracker) -> Fitted:
+        fits.append(own(structure, tracker))
+        return fits[-1]
+
+    monkeypatch.setattr(search, "fitted", counted)
+    monkeypatch.setattr(search, "own_evidence", lambda _: 0.0)
+    assert search._load(far) is None
+    assert [fit.tracker for fit in fits] == [look.fitted.tracker for look in far]
+    assert all(fit.structure.effects[-1] == ("payload", "sledge") for fit in fits)

@@ -277,11 +277,14 @@ class Search(Trials):
             return None  # values by the file explain the records as well
         found: list[Trial] = []
         for look in looks:
+            likely = self.own_evidence(look.fitted)
             for structure in loaded(look.fitted.structure, self.start, self.extensions, self.names):
                 with contextlib.suppress(*ASTRAY):
                     fitted = self.fitted(structure, look.fitted.tracker)
-                    bare = self.fitted(fitted.structure.without(structure.effects[-1]), look.fitted.tracker)
-                    more = min(self.advantage(fitted, one) for one in (look.fitted, bare))
+                    more = (own := self.own_evidence(fitted)) - likely
+                    if more > self.settings.odds:
+                        bare = self.fitted(fitted.structure.without(structure.effects[-1]), look.fitted.tracker)
+                        more = min(more, own - self.own_evidence(bare))
                     found.append(replace(Trial.of(fitted, look), evidence=more))
         best = max(found, key=lambda one: one.evidence, default=None)
         return best if best is not None and best.evidence > self.settings.odds else None

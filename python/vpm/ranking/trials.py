@@ -303,11 +303,13 @@ class Trials:
 
         Under the noise of the one, what it leaves passes for noise, however much of it the other explains.
         """
-        told = (
-            (one, fitted_noise(one.residual, self.fitter.tracked.parts, self.settings.order)) for one in (fitted, other)
+        return self.own_evidence(fitted) - self.own_evidence(other)
+
+    def own_evidence(self, fitted: Fitted) -> float:
+        """Evidence of a fit of the search under the noise that it leaves, nats."""
+        return evidence(
+            fitted, self.fitter, fitted_noise(fitted.residual, self.fitter.tracked.parts, self.settings.order)
         )
-        mine, its = (evidence(one, self.fitter, noise) for one, noise in told)
-        return mine - its
 
     def stands(self, trial: Trial) -> bool:
         """Whether a weighed effect of the search counts and is more probable than chance."""
