@@ -88,6 +88,28 @@ def test_an_effect_that_leaves_the_deflection_behind_its_joint_explains_nothing(
     assert ("leave 94 % of what was left of knee_deflection.position" in sentence) == (word == "unexplained")
 
 
+@pytest.mark.parametrize(("after", "word"), [(5.14e-5, "unexplained"), (9e-6, "effect_found")])
+def test_an_effect_that_a_fine_reading_alone_tells_has_to_explain_that(after: float, word: str) -> None:
+    """A pulley is eccentric by a thousandth of the way: a laser of 5 micrometres sees it, and no drive does."""
+    effect: Any = SimpleNamespace(key=("torque_ripple", "x"))
+    effect.label = "torque_ripple at x"
+    model: Any = SimpleNamespace(effects=(), bodies=(), joints=("x",), parameters={}, joint_behind={}.get)
+    final: Any = SimpleNamespace(model=model, free=(), fit=SimpleNamespace(std=(), unseen=()))
+    shares = {"x": 0.96, "spot": (after / 7.83e-5) ** 2}
+    found: Any = SimpleNamespace(
+        accepted=(effect,), left=shares, within_laws=False, interrupted=False, final=final, ranked=None
+    )
+    data: Any = SimpleNamespace(training=SimpleNamespace(joints=("x",)))
+    gap = {
+        "x.effort": ChannelGap(0.3129, 0.1211, 0.1203, 0.1094, "N", 2.96, "inverse_dynamics"),
+        "spot.x (observed)": ChannelGap(1.12e-4, 7.83e-5, after, 6.9e-6, "m", 6.96e-2, "observed"),
+    }
+    left: Any = SimpleNamespace(present=False)
+    told, sentence, *_ = verdict(data, final, final, found, gap, left, None)
+    assert told == word
+    assert ("leave 43 % of what was left of spot.x" in sentence) == (word == "unexplained")
+
+
 @pytest.mark.parametrize(
     ("effect", "left", "word"),
     [

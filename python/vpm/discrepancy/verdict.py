@@ -158,7 +158,7 @@ def _of_named(
     mostly_open = (open_anywhere and errors.share_left > MOSTLY_OPEN) or described_better
     joints = Joints.of(gap, left, found.left)
     apart = joints.differ and not any(joints.has(entry, found.final.model) for entry in found.accepted)
-    spoiled = _spoiled(found, gap, tracked)
+    spoiled = _spoiled(found, gap, tracked) or _left_to_readings(found, gap, tracked)
     if spoiled or (not apart and not _is_explanation(found, tracked, mostly_open)):
         share = f"{100.0 * (tracked if tracked >= 1.0 else errors.share_left):.0f} % of its mean square"
         return (
@@ -207,6 +207,22 @@ def _spoiled(found: Findings, gap: Mapping[str, ChannelGap], tracked: float) -> 
         if g.mode == "inverse_dynamics" and g.recalibrated < g.signal < g.after:
             return f"more of {channel} than a model without any force"
     return ""
+
+
+def _left_to_readings(found: Findings, gap: Mapping[str, ChannelGap], tracked: float) -> str:
+    """What readings beside efforts keep, in a verdict on effects that no effort shows; "" where one is explained.
+
+    An effect that a fine reading alone tells is judged by its noise: what is little beside the way may be all of it.
+    """
+    main, beside = main_gaps(gap), {channel: g for channel, g in gap.items() if g.mode == OBSERVED}
+    shown = any(g.after**2 <= (1.0 - LEAST_GAIN) * g.recalibrated**2 for g in main)
+    open_ones = {channel: g for channel, g in beside.items() if g.recalibrated > FLOOR_FACTOR * g.noise_floor}
+    if not main or not open_ones or shown or found.within_laws or tracked <= _most_left(found):
+        return ""
+    shares = {channel: (g.after / g.recalibrated) ** 2 for channel, g in open_ones.items()}
+    least = min(shares, key=lambda channel: shares[channel])
+    still = all(g.after > FLOOR_FACTOR * g.noise_floor for g in open_ones.values())
+    return f"{100.0 * shares[least]:.0f} % of what was left of {least}" if still and shares[least] > MOSTLY_OPEN else ""
 
 
 def _rests_on_tracker(found: Findings, data: Data | None) -> bool:
