@@ -3,7 +3,7 @@
 import pytest
 
 from model_texts import effect_text, on_rail
-from sledge import MASS, pushed
+from sledge import MASS, OIL, pushed
 from vpm import EFFECTS, Model, rank
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.experiment import Experiment
@@ -58,11 +58,23 @@ def test_no_load_is_asked_for_where_a_fit_by_another_tracker_stays_by_the_file(l
     """A fit that stopped far from the file is no sign of a load: one of two may have come back."""
     search = Search(described(2.0), logs[:1], tuple(EFFECTS), Settings(), None, ParallelCandidates(1), lambda _: None)
     far = search.looks(search.start)
+    assert not search._are_by_the_file(far)
     load = search._load(far)
     assert load is not None
     assert load.key == ("payload", "sledge")
     near = search.look(search.fitter.unfitted(search.start, far[0].fitted.tracker))
-    assert search._load([*far, near]) is None
+    assert search._are_by_the_file([*far, near])
+
+
+@pytest.mark.parametrize("off", [-1.0, 0.0, 1.0])
+def test_values_off_by_their_uncertainty_are_in_no_doubt(off: float, logs: list[Experiment]) -> None:
+    """Half a nat each is what chance makes of what the records determine, of arms with many bodies far more."""
+    model = described(MASS + off * UNCERTAIN)
+    search = Search(model, logs[:1], tuple(EFFECTS), Settings(), None, ParallelCandidates(1), lambda _: None)
+    (look, *_) = search.looks(search.start)
+    raw = look.fitted.structure.doubt
+    assert raw == pytest.approx(0.5 * off**2 + 0.5 * ((OIL - 7.0) / 1.5) ** 2, abs=0.1)
+    assert look.doubt == pytest.approx(raw - 1.0, abs=0.05)  # mass and drag are determined
 
 
 def test_a_load_that_explains_no_more_is_fitted_once_under_each_tracker(

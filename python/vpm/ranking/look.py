@@ -161,6 +161,19 @@ class Look:
         move = bounded_step(structure, *self.view.weighted(errors, slopes), self.settings.reach)
         return min(errors, errors + slopes @ move, key=self.noise.cost)
 
+    @cached_property
+    def doubt(self) -> float:
+        """By how much a look's values are less probable by the model file than chance makes them, nats.
+
+        Where the file is right, each number that the records determine is off by its deviation, in the mean.
+
+        Law: the number of well-determined parameters (D. MacKay, *Neural Computation* 4, 1992).
+        """
+        errors, slopes = self.view.weighted(*self._errors)
+        told = np.linalg.svd(np.linalg.qr(slopes, mode="r"), compute_uv=False) ** 2
+        determined = float(np.sum(told / (told + float(np.mean(errors**2)))))
+        return self.fitted.structure.doubt - 0.5 * determined
+
     @property
     def promising(self) -> float:
         """Least predicted gain for which a look starts a fit, nats."""

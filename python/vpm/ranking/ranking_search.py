@@ -121,8 +121,7 @@ class Search(Trials):
         Known parameters go astray to make up for what is missing. Effects may then lead on from there, where a single
         one with what the file states explains all of it. One effect stands where its values leave the file in peace.
         """
-        found = looks[0].fitted.structure
-        if len(found.effects) < 2 and found.doubt <= self.settings.odds:
+        if len(looks[0].fitted.structure.effects) < 2 and self._are_by_the_file(looks):
             return looks, rounds
         with contextlib.suppress(*ASTRAY):
             bare = list(self.first.values())
@@ -256,10 +255,9 @@ class Search(Trials):
         file. Fits from there need not lead back: where nothing counts then, they begin at what the file states.
         """
         best, tried = self._best(looks, [self._off_its_ends(look) for look in looks])
-        found = looks[0].fitted.structure
-        if best is not None or found.doubt <= self.settings.odds:
+        if best is not None or self._are_by_the_file(looks):
             return best, tried
-        if not found.effects:
+        if not looks[0].fitted.structure.effects:
             with contextlib.suppress(*ASTRAY):
                 best, more = self._best(looks, [self._as_stated(look) for look in looks])
                 tried = [*more, *tried]
@@ -267,14 +265,16 @@ class Search(Trials):
             return load, [load, *tried]
         return best, tried
 
+    def _are_by_the_file(self, looks: Sequence[Look]) -> bool:
+        """Whether values that the model file allows explain the records of the search under one of its trackers."""
+        return any(look.doubt <= self.settings.odds for look in looks)
+
     def _load(self, looks: Sequence[Look]) -> Trial | None:
-        """Load that a body of the search took along, if it is more probable than values far from the model file.
+        """Load that a body of the search took along, if it is more probable than its values far from the model file.
 
         It leaves no less error than these do: how improbable they are tells. A fit without the load begins where the
         one with it ended, too, for one may have stopped on its way back to the file.
         """
-        if any(look.fitted.structure.doubt <= self.settings.odds for look in looks):
-            return None  # values by the file explain the records as well
         found: list[Trial] = []
         for look in looks:
             likely = self.own_evidence(look.fitted)

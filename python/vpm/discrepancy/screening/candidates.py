@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from itertools import compress, product
 
 import numpy as np
@@ -126,9 +126,9 @@ def candidates(
     - ``residual``: residual of ``model`` on ``data``; periods of a ripple are read from it
     - ``effects``: only these; all that have a law if not given
     """
-    hidden = set(model.added_joints) - springs_shown(model, data)
+    hidden, excitation = set(model.added_joints) - springs_shown(model, data), cache(partial(_excitation, data, model))
     return tuple(
-        _candidate(effect, site, model, data, residual)
+        _candidate(effect, site, model, data, residual, excitation)
         for effect, site in _absent(model, effects)
         if site not in hidden and not beyond(effect, site, model)
     )
@@ -153,8 +153,15 @@ def _absent(model: Model, effects: Sequence[str] | None) -> list[tuple[EffectTyp
     return found
 
 
-def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamicsProblem, residual: Array) -> Candidate:
-    seen = _excitation(data, model, site, site if effect.site in {"actuator", "cylinder"} else None)
+def _candidate(
+    effect: EffectType,
+    site: str,
+    model: Model,
+    data: InverseDynamicsProblem,
+    residual: Array,
+    excitation: Callable[[str, str | None], Excitation],
+) -> Candidate:
+    seen = excitation(site, site if effect.site in {"actuator", "cylinder"} else None)
     if spring_in_series(effect, site, model.effects) is not None:
         found = starts_in_series(seen.travel, way_of_deflection(data, model, site))
         return Candidate(effect, site, *found, effect.fixed, neutral=False)
