@@ -518,10 +518,20 @@ def free_step(errors: Array, slopes: Array, standard: Array) -> Array:
 
     Nothing is known of what further columns of the ``slopes`` stand for.
     """
-    known, unknown = len(standard), slopes.shape[1] - len(standard)
+    return free_step_by(slopes.T @ slopes, slopes.T @ errors, standard)
+
+
+def free_step_by(products: Array, pull: Array, standard: Array) -> Array:
+    """Most probable step of a fit (k,) by products of its derivatives (k, k), and of these with the errors (k,)."""
+    known, unknown = len(standard), len(pull) - len(standard)
     z = np.append(standard, np.zeros(unknown))
-    weights = np.where(np.arange(len(z)) < known, 1.0, 1e-9 * np.sum(slopes**2, axis=0) + 1e-300)
-    return -np.linalg.solve(slopes.T @ slopes + np.diag(weights), slopes.T @ errors + weights * z)
+    weights = np.where(np.arange(len(z)) < known, 1.0, 1e-9 * np.diag(products) + 1e-300)
+    return -np.linalg.solve(products + np.diag(weights), pull + weights * z)
+
+
+def bordered(products: Array, cross: Array, further: Array) -> Array:
+    """Products of derivatives in a fit (k + q, k + q), from those without the last ones (k, k) and with these."""
+    return np.block([[products, cross], [cross.T, further]])
 
 
 def bounded_step(
@@ -532,16 +542,23 @@ def bounded_step(
     Errors have the ``variance`` that is given, or else their own. Where a moment of inertia that records show would
     leave those of its body behind, they come along: else it stops at what they allow.
     """
-    z, scale = structure.standard, max(float(np.mean(errors**2)) if variance is None else variance, 1e-300)
+    scale = max(float(np.mean(errors**2)) if variance is None else variance, 1e-300)
+    with np.errstate(over="ignore", invalid="ignore"):
+        products = slopes.T @ slopes / scale
+    return bounded_step_by(structure, products, slopes.T @ errors / scale, reach)
+
+
+def bounded_step_by(structure: Structure, products: Array, slope: Array, reach: float) -> Array:
+    """Bounded step of a fit by products of its derivatives (k, k), and of these with the errors (k,), by variance."""
+    z = structure.standard
     far = np.isin(np.arange(len(z)), structure.anywhere)
     known = np.where(far, FAINT, 1.0)
-    with np.errstate(over="ignore", invalid="ignore"):
-        normal = slopes.T @ slopes / scale + np.diag(known)
+    normal = products + np.diag(known)
     if not np.all(np.isfinite(normal)):  # as of a joint that stands, of which nothing is left to explain
         raise VpmError(f"{structure.model.name}: the records leave no error that a step could be measured by")
     sizes = 1.0 / np.sqrt(np.diag(normal))
     root = np.linalg.cholesky(normal * np.outer(sizes, sizes) + ROUNDED * np.eye(len(z))).T
-    pull = -(slopes.T @ errors / scale + known * z) * sizes
+    pull = -(slope + known * z) * sizes
     target = np.linalg.solve(root.T, pull)
     low = np.where(far, -np.inf, np.minimum(np.maximum(structure.ends[:, 0] - z, -reach), -1e-12)) / sizes
     high = np.where(far, np.inf, np.maximum(np.minimum(structure.ends[:, 1] - z, reach), 1e-12)) / sizes

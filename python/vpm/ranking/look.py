@@ -14,7 +14,17 @@ from vpm.discrepancy.screening.candidates import Key
 from vpm.errors import VpmError
 from vpm.model import Effect
 from vpm.numbers import Array
-from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step, free_step
+from vpm.ranking.fit import (
+    ASTRAY,
+    Fitted,
+    Fitter,
+    Followed,
+    View,
+    bordered,
+    bounded_step,
+    bounded_step_by,
+    free_step_by,
+)
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.model_structure import Structure, approximate
 from vpm.ranking.noise_model import white_noise
@@ -87,8 +97,7 @@ class Look:
 
         None where it does most in a channel in which no effect could count any more.
         """
-        errors = self.view.errors(self._compared(other), self._fitter.tracked.parts)
-        return self._gain(self._after_a_step(other.structure, *errors), self._alone)
+        return self._gain(self._after_one(self._compared(other)), self._alone)
 
     def gain_along(self, other: Followed) -> tuple[float, float]:
         """Gain that a look predicts for another structure if its change is scaled, nats, and the best scale.
@@ -98,7 +107,9 @@ class Look:
         """
         noise, (before, slopes) = self.noise, self._errors
         along = noise.whitened(self._compared(other).residual, self._fitter.tracked.parts) - before
-        share = float(free_step(before, np.column_stack([slopes, along]), self.coarse.structure.standard)[-1])
+        products = bordered(np.sum(self._products, axis=0), (slopes.T @ along)[:, None], np.array([[along @ along]]))
+        pull = np.append(slopes.T @ before, along @ before)
+        share = float(free_step_by(products, pull, self.coarse.structure.standard)[-1])
         ends = [before + along]
         if share > 0.0:
             ends.append(self._giving_way(before + max(share, NEXT_START) * along))
@@ -129,7 +140,8 @@ class Look:
     def _giving_way(self, errors: Array) -> Array:
         """Errors of a look from which all that is unknown takes what it can, within what is known of it."""
         _, slopes = self._errors
-        return np.asarray(errors + slopes @ free_step(errors, slopes, self.coarse.structure.standard))
+        step = free_step_by(np.sum(self._products, axis=0), slopes.T @ errors, self.coarse.structure.standard)
+        return np.asarray(errors + slopes @ step)
 
     @cached_property
     def _given_way(self) -> Array:
@@ -156,6 +168,40 @@ class Look:
     def _alone(self) -> Array:
         """Errors of the look's structure alone after a step of a fit."""
         return self._after_a_step(self.coarse.structure, *self._errors)
+
+    @cached_property
+    def _products(self) -> Array:
+        """Products of derivatives by what a look has unknown (m, k, k), by channel."""
+        known = self._by_channel(self._errors[1])
+        return _products(known, known)
+
+    def _by_channel(self, slopes: Array) -> Array:
+        """Derivatives (n, k) of a look by channel (m, n / m, k)."""
+        return slopes.reshape(len(self.noise.tails), -1, slopes.shape[1])
+
+    def _after_one(self, other: Followed) -> Array:
+        """Errors of another structure beside a look after one step of a fit, by what both know of derivatives.
+
+        Products of those by what is unknown without it are worked out once for all. Each channel has the scale of its
+        own errors.
+        """
+        own, names = self.coarse.structure, tuple(other.structure.priors)
+        count, slopes = len(own.priors), other.structure.slopes
+        if names[:count] != tuple(own.priors) or not np.array_equal(slopes[:count], own.slopes):
+            return self._after_a_step(other.structure, *self.view.errors(other, self._fitter.tracked.parts))
+        parts, known = self._fitter.tracked.parts, self._by_channel(self._errors[1])
+        errors = self.noise.by_channel(self.noise.whitened(other.residual, parts))
+        places = [other.names.index(name) for name in names[count:]]
+        fresh = self._by_channel(self.noise.whitened(other.jacobian[:, :, places], parts) * slopes[count:])
+        weights, column = 1.0 / np.maximum(np.mean(errors**2, axis=1), 1e-300), errors[:, :, None]
+        cross, further, *slope = (
+            np.tensordot(weights, _products(*pair), 1)
+            for pair in ((known, fresh), (fresh, fresh), (known, column), (fresh, column))
+        )
+        products = bordered(np.tensordot(weights, self._products, 1), cross, further)
+        move = bounded_step_by(other.structure, products, np.concatenate(slope)[:, 0], self.settings.reach)
+        after = errors + known @ move[:count] + fresh @ move[count:]
+        return np.asarray(min(errors.ravel(), after.ravel(), key=self.noise.cost))
 
     def _after_a_step(self, structure: Structure, errors: Array, slopes: Array) -> Array:
         move = bounded_step(structure, *self.view.weighted(errors, slopes), self.settings.reach)
@@ -403,6 +449,11 @@ class Look:
 
     def _squares(self, residual: Array) -> tuple[Array, Array]:
         return self._fitter.tracked.squares(residual, self.noise)
+
+
+def _products(one: Array, other: Array) -> Array:
+    """Products (m, k, q) of a look's derivatives by channel (m, n, k) with others (m, n, q)."""
+    return np.asarray(one.transpose(0, 2, 1) @ other)
 
 
 def same_curve(one: Key, other: Key) -> bool:
