@@ -177,7 +177,8 @@ class Look:
 
     def _by_channel(self, slopes: Array) -> Array:
         """Derivatives (n, k) of a look by channel (m, n / m, k)."""
-        return slopes.reshape(len(self.noise.tails), -1, slopes.shape[1])
+        channels = len(self.noise.tails)
+        return slopes.reshape(channels, len(slopes) // channels, slopes.shape[1])
 
     def _after_one(self, other: Followed) -> Array:
         """Errors of another structure beside a look after one step of a fit, by what both know of derivatives.
