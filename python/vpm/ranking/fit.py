@@ -544,8 +544,8 @@ def bounded_step(
     """
     scale = max(float(np.mean(errors**2)) if variance is None else variance, 1e-300)
     with np.errstate(over="ignore", invalid="ignore"):
-        products = slopes.T @ slopes / scale
-    return bounded_step_by(structure, products, slopes.T @ errors / scale, reach)
+        products, slope = slopes.T @ slopes / scale, slopes.T @ errors / scale
+    return bounded_step_by(structure, products, slope, reach)
 
 
 def bounded_step_by(structure: Structure, products: Array, slope: Array, reach: float) -> Array:
