@@ -1,5 +1,6 @@
 """What counts as left: a channel that is above its noise and more than nothing beside its signal."""
 
+from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
 
@@ -29,6 +30,26 @@ def told(elbow: float) -> str:
     return verdict(data, nominal, recalibrated, found, gap, left, None)[0]
 
 
+def named(label: str, left: Mapping[str, float], behind: str = "", added: tuple[Any, ...] = ()) -> Any:
+    """Findings of one effect, ``name at joint``, with the share of each place that is left, and what is behind it."""
+    name, joint = label.split(" at ")
+    effect: Any = SimpleNamespace(key=(name, joint), label=label)
+    model: Any = SimpleNamespace(
+        effects=added, bodies=(), joints=(joint,), parameters={}, joint_behind={joint: behind or None}.get
+    )
+    final: Any = SimpleNamespace(model=model, free=(), fit=SimpleNamespace(std=(), unseen=()))
+    return SimpleNamespace(
+        accepted=(effect,), left=left, within_laws=False, interrupted=False, final=final, ranked=None
+    )
+
+
+def judged(found: Any, gap: dict[str, ChannelGap], *, structured: bool = True) -> tuple[str, str]:
+    """Verdict on findings of one effect, and its sentence."""
+    data: Any = SimpleNamespace(training=SimpleNamespace(joints=found.final.model.joints))
+    left: Any = SimpleNamespace(present=structured)
+    return verdict(data, found.final, found.final, found, gap, left, None)[:2]
+
+
 @pytest.mark.parametrize(("elbow", "word"), [(8e-3, "parameters_only"), (1.4e-2, "unexplained")])
 def test_a_trifle_above_its_noise_says_nothing_of_another_channel(elbow: float, word: str) -> None:
     assert told(elbow) == word
@@ -49,15 +70,9 @@ def test_what_noise_hides_is_no_evidence_that_nothing_is_missing(floor: float, s
 @pytest.mark.parametrize(("after", "word"), [(0.1, "effect_found"), (0.9, "unexplained")])
 def test_without_efforts_an_effect_that_leaves_the_error_explains_nothing(after: float, word: str) -> None:
     """An observer alone tells what is left: a share of 0.81 of the error power is no explanation."""
-    effect: Any = SimpleNamespace(key=("lugre_friction", "shaft"))
-    effect.label = "lugre_friction at shaft"
-    model: Any = SimpleNamespace(effects=(), bodies=(), joints=("shaft",), parameters={}, joint_behind={}.get)
-    final: Any = SimpleNamespace(model=model, free=(), fit=SimpleNamespace(std=(), unseen=()))
-    found: Any = SimpleNamespace(
-        accepted=(effect,), left={"shaft": after**2}, within_laws=False, interrupted=False, final=final, ranked=None
-    )
+    found = named("lugre_friction at shaft", {"shaft": after**2})
     gap = {"shaft.velocity": ChannelGap(1.0, 1.0, after, NOISE, "rad/s", SIGNAL, "observed")}
-    assert verdict(None, final, final, found, gap, None, None)[0] == word
+    assert verdict(None, found.final, found.final, found, gap, None, None)[0] == word
 
 
 @pytest.mark.parametrize(("after", "word"), [(2.1e-4, "effect_found"), (1.403e-3, "unexplained")])
@@ -66,23 +81,13 @@ def test_an_effect_that_leaves_the_deflection_behind_its_joint_explains_nothing(
 
     Errors are those of its record; the noise of the link's encoder is 2e-4 rad.
     """
-    effect: Any = SimpleNamespace(key=("cubic_spring", "knee"))
-    effect.label = "cubic_spring at knee"
-    model: Any = SimpleNamespace(
-        effects=(), bodies=(), joints=("knee",), parameters={}, joint_behind=lambda joint: f"{joint}_deflection"
-    )
-    final: Any = SimpleNamespace(model=model, free=(), fit=SimpleNamespace(std=(), unseen=()))
     shares = {"knee": 0.04, "knee_deflection": (after / 1.449e-3) ** 2}
-    found: Any = SimpleNamespace(
-        accepted=(effect,), left=shares, within_laws=False, interrupted=False, final=final, ranked=None
-    )
-    data: Any = SimpleNamespace(training=SimpleNamespace(joints=("knee",)))
+    found = named("cubic_spring at knee", shares, "knee_deflection")
     gap = {
         "knee.effort": ChannelGap(0.772, 0.4033, 0.2701, 0.09834, "N m", 7.27, "inverse_dynamics"),
         "knee_deflection.position (observed)": ChannelGap(2e-3, 1.449e-3, after, 1.969e-4, "rad", 9.24e-3, "observed"),
     }
-    left: Any = SimpleNamespace(present=True)
-    told, sentence, *_ = verdict(data, final, final, found, gap, left, None)
+    told, sentence = judged(found, gap)
     assert told == word
     # The sentence tells what is left there, not the little that is left elsewhere.
     assert ("leave 94 % of what was left of knee_deflection.position" in sentence) == (word == "unexplained")
@@ -91,21 +96,12 @@ def test_an_effect_that_leaves_the_deflection_behind_its_joint_explains_nothing(
 @pytest.mark.parametrize(("after", "word"), [(5.14e-5, "unexplained"), (9e-6, "effect_found")])
 def test_an_effect_that_a_fine_reading_alone_tells_has_to_explain_that(after: float, word: str) -> None:
     """A pulley is eccentric by a thousandth of the way: a laser of 5 micrometres sees it, and no drive does."""
-    effect: Any = SimpleNamespace(key=("torque_ripple", "x"))
-    effect.label = "torque_ripple at x"
-    model: Any = SimpleNamespace(effects=(), bodies=(), joints=("x",), parameters={}, joint_behind={}.get)
-    final: Any = SimpleNamespace(model=model, free=(), fit=SimpleNamespace(std=(), unseen=()))
-    shares = {"x": 0.96, "spot": (after / 7.83e-5) ** 2}
-    found: Any = SimpleNamespace(
-        accepted=(effect,), left=shares, within_laws=False, interrupted=False, final=final, ranked=None
-    )
-    data: Any = SimpleNamespace(training=SimpleNamespace(joints=("x",)))
+    found = named("torque_ripple at x", {"x": 0.96, "spot": (after / 7.83e-5) ** 2})
     gap = {
         "x.effort": ChannelGap(0.3129, 0.1211, 0.1203, 0.1094, "N", 2.96, "inverse_dynamics"),
         "spot.x (observed)": ChannelGap(1.12e-4, 7.83e-5, after, 6.9e-6, "m", 6.96e-2, "observed"),
     }
-    left: Any = SimpleNamespace(present=False)
-    told, sentence, *_ = verdict(data, final, final, found, gap, left, None)
+    told, sentence = judged(found, gap, structured=False)
     assert told == word
     assert ("leave 43 % of what was left of spot.x" in sentence) == (word == "unexplained")
 
@@ -120,27 +116,13 @@ def test_an_effect_that_a_fine_reading_alone_tells_has_to_explain_that(after: fl
 )
 def test_a_play_that_does_most_of_the_work_is_the_explanation(effect: str, left: float, word: str) -> None:
     """Its impacts are no more where they were in the log, and the residual with it is as large as without."""
-    entry: Any = SimpleNamespace(key=(effect, "shoulder"))
-    entry.label = f"{effect} at shoulder"
-    added: Any = SimpleNamespace(type=EFFECTS[effect], at="shoulder")
-    model: Any = SimpleNamespace(
-        effects=(added,),
-        bodies=(),
-        joints=("shoulder",),
-        parameters={},
-        joint_behind=lambda joint: f"{joint}_deflection",
-    )
-    final: Any = SimpleNamespace(model=model, free=(), fit=SimpleNamespace(std=(), unseen=()))
-    found: Any = SimpleNamespace(
-        accepted=(entry,), left={"shoulder": left}, within_laws=False, interrupted=False, final=final, ranked=None
-    )
-    data: Any = SimpleNamespace(training=SimpleNamespace(joints=("shoulder",)))
+    added = SimpleNamespace(type=EFFECTS[effect], at="shoulder")
+    found = named(f"{effect} at shoulder", {"shoulder": left}, "shoulder_deflection", (added,))
     gap = {
         "shoulder.effort": ChannelGap(0.0364, 0.0351, 0.0365, 0.0132, "N m", 1.0, "inverse_dynamics"),
         "shoulder.position (observed)": ChannelGap(7.4e-5, 6.6e-5, 6.6e-5 * left**0.5, 9e-6, "rad", 0.68, "observed"),
     }
-    rest: Any = SimpleNamespace(present=True)
-    assert verdict(data, final, final, found, gap, rest, None)[0] == word
+    assert judged(found, gap)[0] == word
 
 
 def test_an_error_that_grew_is_not_told_as_a_gap_that_closed() -> None:
