@@ -107,8 +107,9 @@ class Look:
         """
         noise, (before, slopes) = self.noise, self._errors
         along = noise.whitened(self._compared(other).residual, self._fitter.tracked.parts) - before
-        products = bordered(np.sum(self._products, axis=0), (slopes.T @ along)[:, None], np.array([[along @ along]]))
-        pull = np.append(slopes.T @ before, along @ before)
+        known, pull = self._linear
+        products = bordered(known, (slopes.T @ along)[:, None], np.array([[along @ along]]))
+        pull = np.append(pull, along @ before)
         share = float(free_step_by(products, pull, self.coarse.structure.standard)[-1])
         ends = [before + along]
         if share > 0.0:
@@ -140,7 +141,7 @@ class Look:
     def _giving_way(self, errors: Array) -> Array:
         """Errors of a look from which all that is unknown takes what it can, within what is known of it."""
         _, slopes = self._errors
-        step = free_step_by(np.sum(self._products, axis=0), slopes.T @ errors, self.coarse.structure.standard)
+        step = free_step_by(self._linear[0], slopes.T @ errors, self.coarse.structure.standard)
         return np.asarray(errors + slopes @ step)
 
     @cached_property
@@ -174,6 +175,12 @@ class Look:
         """Products of derivatives by what a look has unknown (m, k, k), by channel."""
         known = self._by_channel(self._errors[1])
         return _products(known, known)
+
+    @cached_property
+    def _linear(self) -> tuple[Array, Array]:
+        """Products of a look's derivatives with each other (k, k) and with its errors (k,), over all channels."""
+        errors, slopes = self._errors
+        return np.sum(self._products, axis=0), slopes.T @ errors
 
     def _by_channel(self, slopes: Array) -> Array:
         """Derivatives (n, k) of a look by channel (m, n / m, k)."""

@@ -277,11 +277,12 @@ class Search(Trials):
         """
         found: list[Trial] = []
         for look in looks:
-            likely = self.own_evidence(look.fitted)
+            without: float | None = None
             for structure in loaded(look.fitted.structure, self.start, self.extensions, self.names):
                 with contextlib.suppress(*ASTRAY):
+                    without = self.own_evidence(look.fitted) if without is None else without
                     fitted = self.fitted(structure, look.fitted.tracker)
-                    more = (own := self.own_evidence(fitted)) - likely
+                    more = (own := self.own_evidence(fitted)) - without
                     if more > self.settings.odds:
                         bare = self.fitted(fitted.structure.without(structure.effects[-1]), look.fitted.tracker)
                         more = min(more, own - self.own_evidence(bare))

@@ -86,14 +86,14 @@ class Trials:
             with contextlib.suppress(*ASTRAY):
                 fitted = self.fitted(structure, Tracker(self.settings.bands[0]))
                 told.append((self.predictive_density(fitted), self.fitter, fitted))
-        if not told:
-            self.fitter = was
-            return None
-        _, self.fitter, fitted = max(told, key=lambda one: one[0])
-        if self.fitter.tracked.of_pressures != was.tracked.of_pressures:
-            return fitted
         self.fitter = was
-        return None
+        if not told:
+            return None
+        _, fitter, fitted = max(told, key=lambda one: one[0])
+        if fitter.tracked.of_pressures == was.tracked.of_pressures:
+            return None
+        self.fitter = fitter
+        return fitted
 
     def looks(self, structure: Structure, known: Look | None = None) -> list[Look]:
         """Looks of the search at a structure under each tracker that can follow it.
