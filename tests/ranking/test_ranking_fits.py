@@ -565,7 +565,7 @@ def test_fits_begin_at_the_file_where_nothing_counts_from_afar(
     """Known parameters that stand in for what is missing need not lead back; the file rules such values out."""
     model, begun = Model.from_toml(SLEDGE.replace("uncertainty = 0.33", "uncertainty = 0.1")), list[float]()
 
-    def nothing(_: Search, __: Look, start: Look) -> list[Any]:
+    def nothing(_: Search, __: Look, start: Look, **___: Any) -> list[Any]:
         begun.append(float(start.fitted.structure.theta[model.index("sledge.mass")]))
         return []
 

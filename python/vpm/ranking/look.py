@@ -259,6 +259,10 @@ class Look:
             return any(self._rooms())
         return any(self._rooms(self._ratio(self.left, self._squares(beside.residual))))
 
+    def saved_by(self, beside: Fitted) -> float:
+        """Cost that another structure saves beside a look under its tracker, nats."""
+        return self.fitted.cost - self._fitter.cost(beside.structure, beside.residual, self.noise)
+
     def leaves_little(self, beside: Fitted) -> bool:
         """Whether another structure leaves less in a look than a second effect has to do, where that has room."""
         left = self._squares(beside.residual)

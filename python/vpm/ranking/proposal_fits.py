@@ -12,7 +12,9 @@ from vpm.ranking.proposals import Proposal
 from vpm.ranking.tried_effect import is_part
 
 
-def raced(chosen: Sequence[Proposal], look: Look, fitter: Fitter, each: ParallelCandidates) -> list[Fitted]:
+def raced(
+    chosen: Sequence[Proposal], look: Look, fitter: Fitter, each: ParallelCandidates, saved: float = 0.0
+) -> list[Fitted]:
     """Fits of the proposals that may win the race.
 
     Each has to gain what makes it worth while. The most promising one is fitted first, then the next two, four, and so
@@ -30,18 +32,21 @@ def raced(chosen: Sequence[Proposal], look: Look, fitter: Fitter, each: Parallel
         What there is without them.
     fitter : Fitter
     each : ParallelCandidates
+    saved : float
+        Cost that another fit has saved, nats.
     """
     ordered = sorted(chosen, key=lambda one: -one.gain)
     model, keys = look.fitted.structure.model, {one.key for one in chosen}
     parts = [one for one in ordered[1:] if any(is_part(model, one.key, key) for key in keys)]
-    ends, wanted = list[Fitted](), _Wanted(look.needed, look.needed)
+    least = max(look.needed, fitter.settings.share * saved)
+    ends, wanted = list[Fitted](), _Wanted(least, least)
     for several in _doubling([one for one in ordered if one not in parts]):
         hopeful = [one for one in several if one.neutral or fitter.settings.patience * one.gain >= wanted.of(one)]
         ended = _fitted(hopeful, wanted, look, fitter, each)
         for one, end in ended:
             wanted = wanted.after(look.fitted.cost - end.cost, one, fitter.settings.share)
         ends += [end for _, end in ended]
-    return ends + [end for _, end in _fitted(parts, _Wanted(look.needed, look.needed), look, fitter, each)]
+    return ends + [end for _, end in _fitted(parts, _Wanted(least, least), look, fitter, each)]
 
 
 @dataclass(frozen=True)

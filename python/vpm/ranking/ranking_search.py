@@ -124,8 +124,8 @@ class Search(Trials):
         if len(looks[0].fitted.structure.effects) < 2 and self._are_by_the_file(looks):
             return looks, rounds
         with contextlib.suppress(*ASTRAY):
-            bare = list(self.first.values())
-            best, tried = self._best(bare, [self._as_stated(look) for look in bare])
+            bare = [one for one in self.first.values() if one.fitted.tracker == looks[0].fitted.tracker]
+            best, tried = self._best(bare, [self._as_stated(look) for look in bare], looks[0].fitted)
             if best is not None and self._is_plainer(best, looks):
                 self.say(f"{best.label} from what the file states does as well alone")
                 rounds = [*rounds, self.listed(best, tried)]
@@ -307,14 +307,19 @@ class Search(Trials):
                     return self.look(other)
         return look
 
-    def _best(self, looks: Sequence[Look], begun: Sequence[Look]) -> tuple[Trial | None, list[Trial]]:
-        """Best additional effect of a search by fits from what was ``begun`` under each tracker, and all tried ones."""
+    def _best(
+        self, looks: Sequence[Look], begun: Sequence[Look], beside: Fitted | None = None
+    ) -> tuple[Trial | None, list[Trial]]:
+        """Best additional effect of a search by fits from what was ``begun`` under each tracker, and all tried ones.
+
+        Each fit has to promise as much as it would in a race with one that was made ``beside`` them.
+        """
         tried: list[Trial] = []
         counting: list[Trial] = []
         for look, start in zip(looks, begun, strict=True):
             if not look.has_room():
                 continue
-            seen = self.tried(look, start)
+            seen = self.tried(look, start, beside=beside)
             done = [self.by_its_own_size(trial) for trial in self.finished(seen)]
             ends = [self.examined(trial) for trial in done if trial.counts]
             tried += [*(trial for trial in ends if not trial.counts), *seen]

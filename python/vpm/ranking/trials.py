@@ -180,11 +180,17 @@ class Trials:
         """Searched structure without one effect, fitted again under its tracker, to judge that by."""
         return self.glance(self.fitted(look.fitted.structure.without(key, side), look.fitted.tracker))
 
-    def tried(self, look: Look, begun: Look, names: Sequence[str] | None = None) -> list[Trial]:
-        """Most promising effects of a search round, fitted under one tracker from the structure that was ``begun``."""
+    def tried(
+        self, look: Look, begun: Look, names: Sequence[str] | None = None, beside: Fitted | None = None
+    ) -> list[Trial]:
+        """Most promising effects of a search round, fitted under one tracker from the structure that was ``begun``.
+
+        They race with a fit that was made ``beside`` them, if one is given.
+        """
         asked = self.names if names is None else names
         chosen = proposals(begun, self.fitter, self.data, self.extensions, self.each, asked, self.bands)
-        fits = raced(chosen, begun, self.fitter, self.each)
+        saved = 0.0 if beside is None else begun.saved_by(beside)
+        fits = raced(chosen, begun, self.fitter, self.each, saved)
         if fits and begun is not look:  # they begin far away, and take more steps
             best = min(fits, key=lambda one: one.cost)
             fits = [self.fitter.finished(best, View(begun.noise)), *(one for one in fits if one is not best)]
