@@ -77,6 +77,7 @@ SHOWN: Mapping[str, dict[str, float]] = {
     "sensor_delay": {"time": 0.005},
     "internal_leakage": {"coefficient": 3e-12},
     "valve_dynamics": {"time": 0.002},
+    "seal_friction": {"share": 0.03, "transition_velocity": 0.01},
     "entrained_air": {"fraction": 0.02},
     "supply_drop": {"resistance": 3e10, "time_constant": 0.002},
 }

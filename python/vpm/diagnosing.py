@@ -449,7 +449,7 @@ def _concluded(
         elif found.accepted:
             empirical, final = beside(found.final, chosen, data)
         gap = gaps_of(data, nominal, known.recalibrated, final, floor)
-        summary = f"{summary} {empirical.sentence}" + (f" {rest.seals.sentence}" if rest.seals is not None else "")
+        summary = f"{summary} {empirical.sentence}"
     records, ambiguous = known.job.records, known.ambiguous if found.accepted else ()
     problems, std = (data.training, data.validation), _deviations(known, found)
     told = of_findings(known.job.model, records, nominal, found, problems, ambiguous, std)

@@ -282,6 +282,8 @@ def _in_words_of_the_catalogue(
         return name, {"contact_damping" if key == "damping" else key: v for key, v in by.items()}
     if name == "end_stop":
         return name, {**by, "damping": by["damping"] / by["stiffness"]}
+    if name == "seal_friction":
+        return name, {"share": by["area"] / values[f"{site}.area"]}
     if name == "sensor_gain":
         return name, {"value": 1.0 + by["excess"]}
     if name == "link_flexibility":

@@ -164,6 +164,7 @@ _ALL = (
         lambda g, _s: {"share": -float(g.uniform(0.2, 0.7)), "time": float(g.uniform(2.0, 8.0))},
         needs=("coulomb_friction",),
     ),
+    Effect("seal_friction", "cylinder", lambda g, _s: {"area": between(g, 1e-6, 2e-5)}),
 )
 
 _OUTSIDE = (
@@ -176,11 +177,6 @@ _OUTSIDE = (
         "periodic_disturbance",
         "joint",
         lambda g, s: {"amplitude": between(g, 0.005, 0.3) * s.effort, "frequency": between(g, 0.7, 8.0)},
-    ),
-    Effect(
-        "pressure_dependent_friction",
-        "cylinder",
-        lambda g, _s: {"area": between(g, 1e-6, 2e-5)},
     ),
 )
 

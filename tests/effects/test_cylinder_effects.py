@@ -30,7 +30,10 @@ EFFECTS: dict[str, tuple[str, dict[str, float]]] = {
     "valve_dynamics": ("servo", {"time": 1.0 / (2.0 * np.pi * 40.0) - 1.0 / SPOOL}),
     "entrained_air": ("pump", {"fraction": 0.02}),
     "supply_drop": ("pump", {"resistance": 2e10, "time_constant": 0.05}),
+    "seal_friction": ("servo", {"share": 0.02, "transition_velocity": 0.02}),
 }
+#: Those that act on the oil, and not on the piston.
+OF_OIL = [name for name in EFFECTS if name != "seal_friction"]
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +65,7 @@ def with_effect(model: vpm.Model, name: str) -> vpm.Model:
 
 
 def own_rates(current: float, _: float, state: Array) -> list[float]:
-    """Rates of pressures a and b, place, velocity, spool, spool rate and drop, with all four effects."""
+    """Rates of pressures a and b, place, velocity, spool, spool rate and drop, with all five effects."""
     pa, pb, x, v, spool, spool_rate, drop = state
     at_valve = SUPPLY - drop
 
@@ -83,12 +86,13 @@ def own_rates(current: float, _: float, state: Array) -> list[float]:
     leak = (LEAKAGE + EFFECTS["internal_leakage"][1]["coefficient"]) * (pa - pb)
     va, vb = 2.9e-6 + AREA * (0.04 + x), 2.9e-6 + RATIO * AREA * (0.04 - x)
     frequency = 2.0 * np.pi * 40.0
-    hoses = EFFECTS["supply_drop"][1]
+    hoses, seals = EFFECTS["supply_drop"][1], EFFECTS["seal_friction"][1]
+    rubbing = seals["share"] * AREA * (pa + pb) * float(np.tanh(v / seals["transition_velocity"]))
     return [
         stiffness(pa) / va * (into_a - AREA * v - leak),
         stiffness(pb) / vb * (-out_of_b + RATIO * AREA * v + leak),
         v,
-        (AREA * (pa - RATIO * pb) - 700.0 * v - 589.927 * x) / 3.0,
+        (AREA * (pa - RATIO * pb) - rubbing - 700.0 * v - 589.927 * x) / 3.0,
         spool_rate,
         frequency**2 * (current - spool) - 2.0 * DAMPING * frequency * spool_rate,
         (hoses["resistance"] * drawn - drop) / hoses["time_constant"],
@@ -135,7 +139,16 @@ def test_nothing_at_its_neutral_value(rig: vpm.Model, name: str) -> None:
         assert np.abs(runs[0][channel] - runs[1][channel]).max() <= 1e-9 * size, channel
 
 
-@pytest.mark.parametrize("name", EFFECTS)
+def test_seals_that_pressures_press_on_are_missed_in_the_effort(rig: vpm.Model) -> None:
+    truth = with_effect(rig, "seal_friction")
+    problem = InverseDynamicsProblem(rig, [record(truth)])
+    without = gaps(problem, problem.evaluate(rig, rig.theta)[0])["axis.effort"][1]
+    within = gaps(problem, problem.evaluate(truth, truth.theta)[0])["axis.effort"][1]
+    assert without > 0.1
+    assert within < 0.02
+
+
+@pytest.mark.parametrize("name", OF_OIL)
 def test_the_balance_vanishes_with_the_effect_and_not_without(rig: vpm.Model, name: str) -> None:
     truth = with_effect(rig, name)
     problem = InverseDynamicsProblem(rig, [record(truth)])

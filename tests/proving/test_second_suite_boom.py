@@ -212,7 +212,7 @@ def test_a_boom_sticks_until_the_oil_outweighs_its_friction() -> None:
 
 
 def test_seals_that_chambers_press_upon_hold_with_their_share_of_both_pressures() -> None:
-    made = plant(Hidden("seal_friction", "luff", {"share": 0.03}), step=1e-4, **SMOOTH)
+    made = plant(Hidden("seal_friction", "lifter", {"share": 0.03}), step=1e-4, **SMOOTH)
     while abs(made.v[0, 0]) < 1e-9:
         held = push(made) * float(made.lever[0]) - weight(0.3)
         pressed = 0.03 * V["piston.area"] * float(made.p.sum() * made.lever[0])

@@ -24,7 +24,7 @@ M = replace(boom.MACHINE, lengths=(2.2,) * 4, substeps=2)
 V = dict(boom.VALUES)
 SMOOTH = V | {"luff.coulomb": 0.0, "seals.coulomb": 0.0}
 #: Speeds over which dry friction of the file turns round: of the pin [rad/s], of the seals [m/s].
-CREEP = {"luff.friction": 1e-4, "lifter.friction": 5e-5}
+CREEP = {"luff.friction": 1e-4, "lifter.friction": 5e-5, "lifter.seal_friction": 5e-5}
 #: Effects whose law is the same in both programs, and a short record that shows them.
 SAME = {
     "bias_force@luff": 1,
@@ -50,11 +50,12 @@ LATE = {"input_delay@lifter": 0.04, "actuator_lag@lifter": 0.05, "sensor_delay@i
 DRY = {"none": 0.02, "asymmetric_friction@luff": 0.02, "hysteresis@luff": 0.2, "stribeck_friction@luff": 0.4}
 #: In the generator friction follows the torque of oil and viscous seals, in the file that of all seals besides.
 DRY["load_dependent_friction@luff"] = 0.07
+DRY["seal_friction@lifter"] = 0.02
 #: Of the joint, of the drive, of a sensor, late, dry: those that are compared outside of `make test-nightly`.
 FEW = {"end_stop@luff", "valve_dynamics@lifter", "sensor_offset@gauge_b", "input_delay@lifter", "none"}
-FEW |= {"load_dependent_friction@luff"}
+FEW |= {"load_dependent_friction@luff", "seal_friction@lifter"}
 #: What the catalogue has no law for.
-NOWHERE = {"seal_friction@luff", "uneven_edges@lifter"}
+NOWHERE = {"uneven_edges@lifter"}
 
 
 def written(values: dict[str, float], *entries: dict[str, object]) -> Model:

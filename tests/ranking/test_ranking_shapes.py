@@ -49,6 +49,9 @@ def test_seals_turn_round_at_a_speed_of_the_piston_that_nobody_knows() -> None:
     sure = Model.from_dict(stated)
     told = known(sure, shown(sure, tracked), tracked)["lifter.friction.transition_velocity"]
     assert [told.value(0.0), told.value(1.0)] == pytest.approx([2e-3, 3e-3])
+    pressed = model.with_effect("seal_friction", at="lifter", share=0.03)
+    own = known(pressed, shown(pressed, tracked), tracked)["lifter.seal_friction.transition_velocity"]
+    assert (own.low, own.high) == pytest.approx((prior.low, prior.high), rel=0.2)
 
 
 def test_seals_that_stick_are_no_other_friction_of_the_joint() -> None:

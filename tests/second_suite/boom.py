@@ -216,7 +216,7 @@ MACHINE = Machine(
         Choice("sensor_offset", "gauge_b", {"value": (3.0 * BAR, 6.0 * BAR)}),
     ),
     outside=(
-        Choice("seal_friction", "luff", {"share": (0.025, 0.045)}),
+        Choice("seal_friction", "lifter", {"share": (0.025, 0.045)}),
         Choice("load_dependent_friction", "luff", {"share": (0.08, 0.14)}),
         Choice("quadratic_drag", "luff", {"drag": (1600.0, 2800.0)}),
         Choice("uneven_edges", "lifter", {"less": (0.04, 0.15)}),

@@ -242,6 +242,8 @@ def _transitions(model: Model, data: InverseDynamicsProblem) -> dict[str, tuple[
         dry = effect.type.sticks and not effect.type.close_to_rest
         if dry and name is not None and effect.at in (*data.joints, *model.transmissions):
             found[name] = slow_speeds(data, shares_at(model, effect.at, data.joints))
+        elif dry and name is not None and effect.at in model.actuators:
+            found[name] = _speeds_of_seals(model, effect.at, data)
     for drive in model.actuators:  # seals rub as joints do
         name = f"{drive}.friction.transition_velocity"
         if name in model.parameters and f"{drive}.friction.coulomb" in model.parameters:

@@ -77,8 +77,6 @@ FOLDS, MOST_TERMS = 5, 5
 TERM_GAIN = 0.03
 #: Transition velocity of dry terms as shares of the largest speed, where no friction of the model has one.
 TRANSITION_SHARES = (0.002, 0.01, 0.04)
-#: Pressure under which the effort of a piston is asked for, Pa.
-UNIT_PRESSURE = 1e5
 #: Longest period that is looked for, in multiples of the travel, and factor by which a fit may move one.
 LONGEST_PERIOD, PERIOD_RANGE = 1.5, 1.15
 #: Share of the power of the efforts that lies in the band in which the remainder is compared.

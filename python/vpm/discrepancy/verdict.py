@@ -154,7 +154,7 @@ def _of_named(
     numbers = f"Error on validation data: {_stages(worst)}, {_percent(worst.after, worst)} after."
     tracked = min(found.left.values(), default=np.nan)
     open_anywhere = errors.structured or (data is None and bool(errors.still))  # without efforts an observer can tell
-    described_better = rest is not None and (rest.open > MOSTLY_OPEN or rest.seals is not None)
+    described_better = rest is not None and rest.open > MOSTLY_OPEN
     mostly_open = (open_anywhere and errors.share_left > MOSTLY_OPEN) or described_better
     joints = Joints.of(gap, left, found.left)
     apart = joints.differ and not any(joints.has(entry, found.final.model) for entry in found.accepted)

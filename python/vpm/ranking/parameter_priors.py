@@ -152,11 +152,13 @@ def known(model: Model, data: InverseDynamicsProblem, tracked: TrackedRecords) -
     cylinder rub as joints do.
     """
     priors = stated(model)
+    drives = {f"{drive}.friction.transition_velocity": model.rate_channel(drive) for drive in model.actuators}
     for effect in model.effects:
         name = effect.parameter_names.get("transition_velocity")
         if name is not None and name not in priors and effect.at in (*data.joints, *model.transmissions):
             priors[name] = _turning(*slow_speeds(data, shares_at(model, effect.at, data.joints)))
-    drives = {f"{drive}.friction.transition_velocity": model.rate_channel(drive) for drive in model.actuators}
+        elif name is not None and effect.at in model.actuators:
+            drives[name] = model.rate_channel(effect.at)
     unknown = {name: rate for name, rate in drives.items() if name in model.parameters and name not in priors}
     rates = tracked.outputs(model, tuple(unknown.values()))
     fastest = (max(float(np.quantile(np.abs(speeds), 0.999)), LEAST) for speeds in rates)

@@ -62,7 +62,7 @@ class _Plant:
         self.joints = Driveline(JOINTS, columns, links, step)
         self.oil = Cylinders(DRIVES, columns, "pump", step)
         self.triangles = Triangles()
-        self.seal = stack(columns, DRIVES, "pressure_dependent_friction.area")
+        self.seal = stack(columns, DRIVES, "seal_friction.area")
         q = np.array(START)[:, None] + self.joints.q
         self.joints.q = self.joints.motor_q = q
         self.oil.start(links.load(q, np.zeros_like(q)) / self.triangles(q)[1])

@@ -51,7 +51,7 @@ class _Plant:
     def __init__(self, columns: Sequence[Column], step: float) -> None:
         self.axis = Driveline(["axis"], columns, _Slide(columns), step)
         self.oil = Cylinders(["servo"], columns, "pump", step)
-        self.seal = stack(columns, ["servo"], "pressure_dependent_friction.area")
+        self.seal = stack(columns, ["servo"], "seal_friction.area")
 
     def outputs(self) -> Array:
         return np.concatenate([self.axis.encoder, self.oil.pa, self.oil.pb])

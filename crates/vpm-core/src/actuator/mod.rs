@@ -27,6 +27,7 @@ pub use saturation::Saturation;
 pub use spring_damper::SpringDamper;
 pub use table::TableDrive;
 
+use self::hydraulic::Chambers;
 use crate::effect::Domain;
 use crate::effect::Law;
 use crate::effect::LoadDependentFriction;
@@ -151,10 +152,11 @@ impl<S: Scalar> Actuator<S> {
         self.friction.as_ref().map_or_else(S::zero, |law| -law.effort_under(S::zero(), rate, force))
     }
 
-    /// Friction resistance of an actuator at `rate`: the chord from rest, where its drive gives `force` at rest.
-    pub(crate) fn resistance(&self, force: S, rate: S) -> S {
+    /// Friction resistance of an actuator at `rate`: the chord from rest, where its drive gives `force` at rest. Seals of
+    /// a cylinder are between `pressures` (Pa).
+    pub(crate) fn resistance(&self, force: S, rate: S, pressures: Chambers<S>) -> S {
         let own = match &self.drive {
-            Drive::Hydraulic(law) => law.cylinder.seal.resistance(rate),
+            Drive::Hydraulic(law) => law.cylinder.rubbing_chord(rate, pressures),
             Drive::DcMotor(law) => law.gear_resistance(force, rate),
             _ => S::zero(),
         };

@@ -1,7 +1,7 @@
 //! Drives and supplies of a machine: what they push, and how their states change.
 
 use super::Dynamics;
-use crate::actuator::hydraulic::{Source, Supply};
+use crate::actuator::hydraulic::{Chambers, Source, Supply};
 use crate::actuator::{Actuator, Drive, Maxwell, SpringDamper, Target};
 use crate::data::LineSlot;
 use crate::dynamics::flexible;
@@ -33,6 +33,11 @@ impl<S: Scalar> Shown<S> {
             drops: vec![S::zero(); supplies.len()],
             supplies: supplies.iter().map(|supply| [supply.pressure, S::zero()]).collect(),
         }
+    }
+
+    /// Pressures of the cylinders (Pa) as shown, in the order of the hydraulic drives.
+    pub(super) fn chambers(&self) -> impl Iterator<Item = Chambers<S>> {
+        self.hydraulics.iter().map(|&[_, a, b, ..]| Chambers { a, b })
     }
 }
 
@@ -182,7 +187,7 @@ impl<S: Scalar> Dynamics<S> {
                     shown.hydraulics[cylinders] =
                         [action.spool, pressures.a, pressures.b, flows.into_a, flows.out_of_b];
                     (at, cylinders) = (own.end, cylinders + 1);
-                    let seal = if seals[number].is_none() { law.cylinder.seal.force(rate) } else { S::zero() };
+                    let seal = if seals[number].is_none() { law.cylinder.rubbing(rate, pressures) } else { S::zero() };
                     action.force + seal
                 }
             };

@@ -71,11 +71,13 @@ impl<S: Scalar> Dynamics<S> {
         if self.ideal || !self.actuators.iter().any(rubs) {
             return;
         }
-        let mut currents = self.shown.currents.iter();
+        let (mut currents, mut cylinders) = (self.shown.currents.iter(), self.shown.chambers());
         for ((actuator, &force), chord) in self.actuators.iter().zip(&self.driven).zip(chords) {
             let [_, rate] = motion(actuator.on, q, v, &self.data.composite.lines);
             let own = match &actuator.drive {
-                Drive::Hydraulic(law) if law.cylinder.seal.is_there() => law.cylinder.seal.resistance(rate),
+                Drive::Hydraulic(law) => {
+                    cylinders.next().map_or(S::zero(), |held| law.cylinder.rubbing_chord(rate, held))
+                }
                 Drive::DcMotor(law) => {
                     let current = currents.next().copied().unwrap_or_default();
                     law.gear_resistance(law.driving(current), rate)

@@ -2,7 +2,8 @@
 
 use super::Dynamics;
 use super::connections::{PlacedBushing, PlacedContact};
-use crate::actuator::Target;
+use crate::actuator::hydraulic::Chambers;
+use crate::actuator::{Drive, Target};
 use crate::bushing::Bushing;
 use crate::contact::ContactFriction;
 use crate::dynamics::{for_each_column, poses};
@@ -61,13 +62,17 @@ impl Dynamics<f64> {
             let (slope, stiffness) = (rest.resistance - fast.resistance, rest.push * rest.gain);
             Rubbing { along: at(seat), slope, stiffness, damping: fast.resistance, ..Rubbing::default() }
         });
+        let mut cylinders = self.shown.chambers();
         let actuators = self.actuators.iter().zip(&self.driven).map(|(actuator, &force)| {
+            let none = Chambers { a: 0.0, b: 0.0 };
+            let cylinder = matches!(actuator.drive, Drive::Hydraulic(_));
+            let held = if cylinder { cylinders.next().unwrap_or(none) } else { none };
             let mut along = zeros();
             match actuator.on {
                 Target::Joint(joint) => along[joint] = 1.0,
                 Target::Line(line) => self.data.line_load(line, 1.0, &mut along),
             }
-            let [rest, fast] = [0.0, FAST].map(|v| actuator.resistance(force, v));
+            let [rest, fast] = [0.0, FAST].map(|v| actuator.resistance(force, v, held));
             Rubbing { along, slope: rest - fast, taken: Taken::ByChord, ..Rubbing::default() }
         });
         effects.chain(memories).chain(actuators).collect()

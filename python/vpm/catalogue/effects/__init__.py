@@ -47,6 +47,7 @@ ORDER = (
     "position_dependent_friction",
     "load_dependent_friction",
     "drive_friction",
+    "seal_friction",
     "current_ripple",
     "lugre_friction",
     "warming_friction",

@@ -15,7 +15,6 @@ from scipy.special import stdtrit
 
 from vpm.discrepancy.judged_model import Data, Judged
 from vpm.discrepancy.remainder.empirical_formula import Described, describe
-from vpm.discrepancy.remainder.seal_friction import Seals, seals
 from vpm.discrepancy.settings import EFFORT_SHARE, FALSE_ALARM_LEVEL, MODEST_FACTOR, MODEST_GAIN, WORTH_A_NAME
 from vpm.discrepancy.shifted_commands import in_time
 from vpm.identify import Gain, InverseDynamicsProblem, gain, segments
@@ -54,7 +53,6 @@ class Remainder:
     #: Share that the effects leave of the mean square that a fit finds in the recalibrated residual; 0 where nothing
     #: repeats.
     open: float
-    seals: Seals | None = None  #: Friction of seals, a single number, that clearly leaves less than the effects.
 
     @property
     def best(self) -> Described:
@@ -74,13 +72,12 @@ def remainder(recalibrated: Judged, final: Judged, data: Data, workers: int = 1)
     view = _View(data, motion_band(data.training, final.model), Thresholds(len(bases)))
     left = view(final)
     clear = [view.clearly_better(choice, left) for choice in choices]
-    pressed = None if recalibrated is final else view.pressed(recalibrated, left)
     if not any(clear):
-        return Remainder(choices, repeats=pressed is not None, open=0.0, seals=pressed)
+        return Remainder(choices, repeats=False, open=0.0)
     rest, whole = power(in_time(final, data).validation), power(_before(recalibrated, final, data))
     least = min(view.leaves(choice) for choice, better in zip(choices, clear, strict=True) if better)
     share = np.clip((rest - least) / max(whole - least, 1e-300), 0.0, 1.0)
-    return Remainder(choices, repeats=True, open=float(share), seals=pressed)
+    return Remainder(choices, repeats=True, open=float(share))
 
 
 def _before(recalibrated: Judged, final: Judged, data: Data) -> Array:
@@ -108,14 +105,6 @@ class _View:
             own = self(choice.base)
             return power(own) - self._said(choice, own) < (1.0 - WORTH_A_NAME) * power(left)
         return self.thresholds.met(gain(left, self(choice.judged), segments(self.data.validation)))
-
-    def pressed(self, recalibrated: Judged, left: Array) -> Seals | None:
-        """Friction of seals that predicts surely more than the effects, in their place."""
-        found = seals(recalibrated, self.data)
-        if found is None:
-            return None
-        alone = below(self.data.validation, found.validation, self.frequency)
-        return found if self.thresholds.met(gain(left, alone, segments(self.data.validation))) else None
 
     def leaves(self, choice: Described) -> float:
         """Sum of squares that a description of the remainder leaves at all frequencies."""

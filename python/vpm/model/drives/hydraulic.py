@@ -329,7 +329,10 @@ class Hydraulic(Drive):
                 **numbers(f"{name}.cylinder", cylinder, index),
                 "worn_leakage": index.get(f"{name}.internal_leakage.coefficient"),
                 "stop": {key: index[f"{name}.cylinder.stop_{key}"] for key in ("stiffness", "damping")},
-                "seal": {law: group(f"{name}.friction", keys, index) for law, keys in seals.items()},
+                "seal": {
+                    **{law: group(f"{name}.friction", keys, index) for law, keys in seals.items()},
+                    "pressed": group(f"{name}.seal_friction", ("share", "transition_velocity"), index),
+                },
             },
             **pressures,
         }

@@ -121,10 +121,22 @@ impl<S: Scalar> Cylinder<S> {
         areas.a * pressures.a - areas.b * pressures.b
     }
 
-    /// Force of the cylinder's seals and stops on the piston in N.
+    /// Force of the cylinder's seals on the piston in N, which moves with `v` (m/s) between `pressures` (Pa).
     #[inline]
-    pub fn resistance(&self, x: S, v: S) -> S {
-        self.seal.force(v) + self.stop.force(x, v, self.stroke * 0.5)
+    pub fn rubbing(&self, v: S, pressures: Chambers<S>) -> S {
+        self.seal.force(v, self.areas().a, pressures)
+    }
+
+    /// Chord from rest of the force of the cylinder's seals, N s/m.
+    #[inline]
+    pub fn rubbing_chord(&self, v: S, pressures: Chambers<S>) -> S {
+        self.seal.resistance(v, self.areas().a, pressures)
+    }
+
+    /// Force of the cylinder's seals and stops on the piston in N, at `x` (m) between `pressures` (Pa).
+    #[inline]
+    pub fn resistance(&self, x: S, v: S, pressures: Chambers<S>) -> S {
+        self.rubbing(v, pressures) + self.stop.force(x, v, self.stroke * 0.5)
     }
 
     /// Leakage of each cylinder chamber past piston and rod in m^3/s.

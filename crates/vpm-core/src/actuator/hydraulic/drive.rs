@@ -91,7 +91,7 @@ impl<S: Scalar> HydraulicDrive<S> {
 
     /// Action of the hydraulic drive in its `states` under a `current` (A); the `rates` are written. The piston is at
     /// `x` (m) and moves with `v` (m/s); `supply` feeds at `pressure` (Pa). The friction of the seals,
-    /// [`super::SealFriction::force`], is not in it.
+    /// [`super::Cylinder::rubbing`], is not in it.
     #[inline]
     pub fn action(
         &self,

@@ -22,7 +22,7 @@ pub use drive::{DriveAction, HydraulicDrive};
 pub use fluid::{EntrainedAir, Fluid};
 pub use load::{Pressures, chambers_under_load};
 pub use orifice::Orifice;
-pub use piston::{EndStop, SealFriction};
+pub use piston::{EndStop, PressedSeals, SealFriction};
 pub use servo::{Load, ServoCylinder, ServoRig, ServoState};
 pub use size::PistonSize;
 pub use supply::{Sagging, Source, Supply, SupplyDrop};

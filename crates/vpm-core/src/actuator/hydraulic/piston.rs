@@ -2,8 +2,9 @@
 
 use serde::Deserialize;
 
-use super::NamedDomain;
+use super::{Chambers, NamedDomain};
 use crate::effect::CoulombFriction;
+use crate::effect::Domain;
 use crate::effect::Law;
 use crate::effect::StribeckFriction;
 use crate::effect::ViscousFriction;
@@ -37,7 +38,30 @@ impl<S: Scalar> EndStop<S> {
     }
 }
 
-/// Friction of a piston's seals: any of the laws of joints, added up.
+/// Dry friction of a piston's seals that the pressures of both chambers press on.
+///
+/// Law: `-share A (pa + pb) tanh(v / transition_velocity)`, N, with the area `A` of the piston (m^2), pressures in Pa, v in m/s.
+/// Source: Bonchis, Corke & Rye 1999, "A pressure-based, velocity independent, friction model for asymmetric hydraulic cylinders",
+/// IEEE International Conference on Robotics and Automation. Checked: the transition velocity is positive.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PressedSeals<P> {
+    /// Friction as a share of the piston's area times the sum of the pressures.
+    pub share: P,
+    /// Velocity at which tanh(1) = 76 % of the friction is reached, m/s.
+    pub transition_velocity: P,
+}
+
+impl<S: Scalar> PressedSeals<S> {
+    /// Law of a piston whose seals are pressed by `pressures` (Pa) on an `area` (m^2).
+    #[inline]
+    fn under(&self, area: S, pressures: Chambers<S>) -> CoulombFriction<S> {
+        let coulomb = self.share * area * (pressures.a + pressures.b);
+        CoulombFriction { coulomb, transition_velocity: self.transition_velocity }
+    }
+}
+
+/// Friction of a piston's seals: any of the laws of joints, and friction that the pressures make, added up.
 ///
 /// Checked: see each law.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
@@ -52,6 +76,9 @@ pub struct SealFriction<P> {
     /// Extra friction at low speed.
     #[serde(default = "crate::actuator::none")]
     pub stribeck: Option<StribeckFriction<P>>,
+    /// Dry friction that grows with the pressures.
+    #[serde(default = "crate::actuator::none")]
+    pub pressed: Option<PressedSeals<P>>,
 }
 
 impl<P> SealFriction<P> {
@@ -61,6 +88,10 @@ impl<P> SealFriction<P> {
             viscous: self.viscous.as_ref().map(|law| law.map(f)),
             coulomb: self.coulomb.as_ref().map(|law| law.map(f)),
             stribeck: self.stribeck.as_ref().map(|law| law.map(f)),
+            pressed: self
+                .pressed
+                .as_ref()
+                .map(|law| PressedSeals { share: f(&law.share), transition_velocity: f(&law.transition_velocity) }),
         }
     }
 
@@ -69,34 +100,46 @@ impl<P> SealFriction<P> {
         let viscous = self.viscous.iter().flat_map(ViscousFriction::domains);
         let coulomb = self.coulomb.iter().flat_map(CoulombFriction::domains);
         let stribeck = self.stribeck.iter().flat_map(StribeckFriction::domains);
+        let pressed = self.pressed.iter().flat_map(|law| {
+            [
+                ("cylinder.seal.pressed", &law.share, Domain::Any),
+                ("cylinder.seal.pressed", &law.transition_velocity, Domain::Positive),
+            ]
+        });
         let named = |name: &'static str| move |(parameter, domain)| (name, parameter, domain);
         viscous
             .map(named("cylinder.seal.viscous"))
             .chain(coulomb.map(named("cylinder.seal.coulomb")))
             .chain(stribeck.map(named("cylinder.seal.stribeck")))
+            .chain(pressed)
             .collect()
     }
 }
 
 impl<S: Scalar> SealFriction<S> {
-    /// Force in N on a piston moving with `v` (m/s).
+    /// Force in N on a piston of this `area` (m^2) that moves with `v` (m/s) between `pressures` (Pa).
     #[inline]
-    pub fn force(&self, v: S) -> S {
-        let viscous = self.viscous.map_or(S::zero(), |law| law.effort(S::zero(), v));
-        let coulomb = self.coulomb.map_or(S::zero(), |law| law.effort(S::zero(), v));
-        viscous + coulomb + self.stribeck.map_or(S::zero(), |law| law.effort(S::zero(), v))
+    pub fn force(&self, v: S, area: S, pressures: Chambers<S>) -> S {
+        let zero = S::zero();
+        let pressed = self.pressed.map_or(zero, |law| law.under(area, pressures).effort(zero, v));
+        let viscous = self.viscous.map_or(zero, |law| law.effort(zero, v));
+        let coulomb = self.coulomb.map_or(zero, |law| law.effort(zero, v));
+        viscous + coulomb + self.stribeck.map_or(zero, |law| law.effort(zero, v)) + pressed
     }
-    /// Resistance of a piston's seals in N s/m at velocity `v` (m/s): the chord from rest. The force is `-r v`.
+
+    /// Resistance of a piston's seals in N s/m at velocity `v` (m/s) between `pressures` (Pa): the chord from rest.
     #[inline]
-    pub fn resistance(&self, v: S) -> S {
-        let viscous = self.viscous.map_or(S::zero(), |law| law.resistance(S::zero(), v));
-        let coulomb = self.coulomb.map_or(S::zero(), |law| law.resistance(S::zero(), v));
-        viscous + coulomb + self.stribeck.map_or(S::zero(), |law| law.resistance(S::zero(), v))
+    pub fn resistance(&self, v: S, area: S, pressures: Chambers<S>) -> S {
+        let zero = S::zero();
+        let pressed = self.pressed.map_or(zero, |law| law.under(area, pressures).resistance(zero, v));
+        let viscous = self.viscous.map_or(zero, |law| law.resistance(zero, v));
+        let coulomb = self.coulomb.map_or(zero, |law| law.resistance(zero, v));
+        viscous + coulomb + self.stribeck.map_or(zero, |law| law.resistance(zero, v)) + pressed
     }
 
     /// Whether a piston has any seal friction.
     #[inline]
     pub fn is_there(&self) -> bool {
-        self.viscous.is_some() || self.coulomb.is_some() || self.stribeck.is_some()
+        self.viscous.is_some() || self.coulomb.is_some() || self.stribeck.is_some() || self.pressed.is_some()
     }
 }

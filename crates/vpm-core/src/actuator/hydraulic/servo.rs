@@ -129,7 +129,7 @@ impl<S: Scalar> ServoCylinder<S> {
         let (x, v, load) = (state.position, state.velocity, &self.load);
         let (pressures, flows) = (self.pressures(state), self.flows(state));
         let inflow = Chambers { a: flows.into_a, b: -flows.out_of_b };
-        let driven = self.cylinder.force(pressures) + self.cylinder.resistance(x, v);
+        let driven = self.cylinder.force(pressures) + self.cylinder.resistance(x, v, pressures);
         ServoState {
             position: v,
             spool: state.spool_rate,

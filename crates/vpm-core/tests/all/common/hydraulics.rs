@@ -19,7 +19,7 @@ pub fn nominal() -> ServoCylinder<f64> {
         worn_leakage: None,
         external_leakage: 0.0,
         stop: EndStop { stiffness: 5e8, damping: 2e4 },
-        seal: SealFriction { viscous: None, coulomb: None, stribeck: None },
+        seal: SealFriction { viscous: None, coulomb: None, stribeck: None, pressed: None },
     };
     ServoCylinder {
         fluid: Fluid { bulk_modulus: 1.2e9, vapour_pressure: 1e3, air: None, more_air: None },

@@ -50,7 +50,8 @@ fn seal(servo: &ServoCylinder<f64>) -> Value {
     json!({"viscous": seal.viscous.map(|law| json!({"viscous": law.viscous})),
         "coulomb": seal.coulomb.map(|law| json!({"coulomb": law.coulomb, "transition_velocity": law.transition_velocity})),
         "stribeck": seal.stribeck.map(|law| json!({"stribeck": law.stribeck, "stribeck_velocity": law.stribeck_velocity,
-            "transition_velocity": law.transition_velocity}))})
+            "transition_velocity": law.transition_velocity})),
+        "pressed": seal.pressed.map(|law| json!({"share": law.share, "transition_velocity": law.transition_velocity}))})
 }
 
 /// The rig as a machine: a mass on a rail with damper and spring, pushed by the cylinder.

@@ -4,7 +4,8 @@ use allocation_counter::measure;
 use proptest::prelude::*;
 use vpm_core::actuator::DeadZone;
 use vpm_core::actuator::hydraulic::{
-    Chambers, EntrainedAir, Fluid, Load, Orifice, PistonSize, SealFriction, ServoCylinder, ServoRig, ServoState,
+    Chambers, EntrainedAir, Fluid, Load, Orifice, PistonSize, PressedSeals, SealFriction, ServoCylinder, ServoRig,
+    ServoState,
 };
 use vpm_core::effect::{CoulombFriction, StribeckFriction, ViscousFriction};
 use vpm_core::error::Error;
@@ -26,21 +27,28 @@ fn complete() -> ServoCylinder<f64> {
         viscous: Some(ViscousFriction { viscous: 120.0 }),
         coulomb: Some(CoulombFriction { coulomb: 30.0, transition_velocity: 0.01 }),
         stribeck: Some(StribeckFriction { stribeck: 15.0, stribeck_velocity: 0.02, transition_velocity: 0.01 }),
+        pressed: Some(PressedSeals { share: 0.02, transition_velocity: 0.01 }),
     };
     servo
 }
 
 #[test]
 fn seals_resist_by_their_chord() {
-    let seal = complete().cylinder.seal;
+    let (seal, area, held) = (complete().cylinder.seal, 2e-4, Chambers { a: 6e6, b: 9e6 });
     for v in [-0.3_f64, -0.004, 0.01, 0.05] {
         let (rounded, fading) = ((v / 0.01).tanh(), (-(v / 0.02) * (v / 0.02)).exp());
-        let force = -(120.0 * v + (30.0 + 15.0 * fading) * rounded);
-        assert!((seal.force(v) - force).abs() < 1e-12 && (seal.resistance(v) * v + force).abs() < 1e-12, "{v}");
+        let force = -(120.0 * v + (30.0 + 15.0 * fading + 0.02 * 2e-4 * 15e6) * rounded);
+        let [told, chord] = [seal.force(v, area, held), seal.resistance(v, area, held)];
+        assert!((told - force).abs() < 1e-12 && (chord * v + force).abs() < 1e-12, "{v}");
     }
     let none = nominal().cylinder.seal;
-    let (viscous, coulomb, stribeck) = (seal.viscous, seal.coulomb, seal.stribeck);
-    let alone = [SealFriction { viscous, ..none }, SealFriction { coulomb, ..none }, SealFriction { stribeck, ..none }];
+    let (viscous, coulomb, stribeck, pressed) = (seal.viscous, seal.coulomb, seal.stribeck, seal.pressed);
+    let alone = [
+        SealFriction { viscous, ..none },
+        SealFriction { coulomb, ..none },
+        SealFriction { stribeck, ..none },
+        SealFriction { pressed, ..none },
+    ];
     assert!(alone.iter().all(SealFriction::is_there) && !none.is_there());
 }
 
@@ -92,7 +100,7 @@ fn chambers_trade_volume_along_the_stroke() {
 #[test]
 fn every_number_has_its_domain() {
     type Spoil = fn(&mut ServoCylinder<f64>);
-    let spoiled: [(&str, Spoil); 26] = [
+    let spoiled: [(&str, Spoil); 27] = [
         ("fluid.bulk_modulus", |servo| servo.fluid.bulk_modulus = 0.0),
         ("fluid.vapour_pressure", |servo| servo.fluid.vapour_pressure = 0.0),
         ("fluid.air.fraction", |servo| servo.fluid.air = Some(EntrainedAir { fraction: -0.1, ..AIR })),
@@ -120,6 +128,9 @@ fn every_number_has_its_domain() {
         ("cylinder.external_leakage", |servo| servo.cylinder.external_leakage = -1e-13),
         ("cylinder.stop.stiffness", |servo| servo.cylinder.stop.stiffness = 0.0),
         ("cylinder.stop.damping", |servo| servo.cylinder.stop.damping = -1.0),
+        ("cylinder.seal.pressed", |servo| {
+            servo.cylinder.seal.pressed = Some(PressedSeals { share: 0.02, transition_velocity: 0.0 });
+        }),
         ("cylinder.seal.coulomb", |servo| {
             servo.cylinder.seal.coulomb = Some(CoulombFriction { coulomb: 30.0, transition_velocity: 0.0 });
         }),
@@ -274,7 +285,7 @@ impl Metered {
         let enthalpy = |p: f64| servo.fluid.bulk_modulus * (p / servo.fluid.bulk_modulus).exp_m1();
         let oil =
             (flows.into_a - leakage.a) * enthalpy(pressures.a) - (flows.out_of_b + leakage.b) * enthalpy(pressures.b);
-        let resisted = servo.cylinder.resistance(x[0], x[2]) - servo.load.damping * x[2] - self.0.force;
+        let resisted = servo.cylinder.resistance(x[0], x[2], pressures) - servo.load.damping * x[2] - self.0.force;
         oil + resisted * x[2]
     }
 }

@@ -2,7 +2,7 @@
 
 use allocation_counter::measure;
 use serde_json::{Value, json};
-use vpm_core::actuator::hydraulic::{EntrainedAir, SealFriction};
+use vpm_core::actuator::hydraulic::{EntrainedAir, PressedSeals, SealFriction};
 use vpm_core::actuator::hydraulic::{ServoCylinder, ServoRig, ServoState};
 use vpm_core::effect::{CoulombFriction, StribeckFriction, ViscousFriction};
 use vpm_core::error::Error;
@@ -92,6 +92,7 @@ fn complete() -> ServoCylinder<f64> {
         viscous: Some(ViscousFriction { viscous: 120.0 }),
         coulomb: Some(CoulombFriction { coulomb: 30.0, transition_velocity: 0.01 }),
         stribeck: Some(StribeckFriction { stribeck: 15.0, stribeck_velocity: 0.02, transition_velocity: 0.01 }),
+        pressed: Some(PressedSeals { share: 0.02, transition_velocity: 0.01 }),
     };
     servo
 }
