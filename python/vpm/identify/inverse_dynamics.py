@@ -33,6 +33,7 @@ from vpm.initial import joint_motion
 from vpm.model import Model
 from vpm.numbers import Array
 from vpm.simulate import AUTOMATIC
+from vpm.simulate.inputs import lengths_of
 from vpm.simulate.setup import HOLDS
 
 #: One step of second order for each sample, and the share of what drives answer that it may be off by: noise of
@@ -84,7 +85,8 @@ class InverseDynamicsProblem(BegunAnywhere):
         self.experiments = tuple(experiments)
         #: What was given: the model before any fit.
         self.nominal = model
-        self.hold = hold
+        self.hold = HOLDS[0] if hold == AUTOMATIC else hold
+        self._moving = lengths_of(model, hold)
         self._bands = tuple(_each(band, experiments))
         self.motions = self._motions(experiments, _each(cutoff, experiments))
         for m in self.motions:
@@ -114,7 +116,7 @@ class InverseDynamicsProblem(BegunAnywhere):
 
     def _motions(self, experiments: Sequence[Experiment], cutoffs: Sequence[float | None]) -> tuple[Motion, ...]:
         return tuple(
-            joint_motion(e, self.nominal, cutoff, commanded=True, band=band).held_as(self.hold)
+            joint_motion(e, self.nominal, cutoff, commanded=True, band=band).held_as(self.hold, self._moving)
             for e, cutoff, band in zip(experiments, cutoffs, self._bands, strict=True)
         )
 

@@ -7,19 +7,32 @@ from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError, SimulationError
 from vpm.experiment import Experiment
+from vpm.experiment.motion import running_on
 from vpm.model import Model
 from vpm.numbers import Array
+from vpm.simulate.setup import AUTOMATIC, Setup
 
 
-def held_inputs(model: Model, experiment: Experiment, mode: str) -> Array:
-    """Commands and pressures of logged supplies, one column each; springs without a command keep their length."""
+def held_inputs(model: Model, experiment: Experiment, mode: str, setup: Setup) -> Array:
+    """Commands and pressures of logged supplies, one column each; springs without a command keep their length.
+
+    The end of a spring cannot jump. Where nobody says what is held, its length is the mean until the next sample.
+    """
     _require(experiment, [name for name in model.input_channels if name not in model.optional_inputs], mode)
-    return _optional(experiment, model.input_channels)
+    table = _optional(experiment, model.input_channels)
+    return running_on(table, lengths_of(model, setup.hold))
 
 
-def simulation_inputs(model: Model, experiment: Experiment) -> Array:
+def simulation_inputs(model: Model, experiment: Experiment, setup: Setup) -> Array:
     """What a free run holds between samples, shape (N, inputs): commands and pressures of logged supplies."""
-    return held_inputs(model, experiment, "free_run")
+    return held_inputs(model, experiment, "free_run", setup)
+
+
+def lengths_of(model: Model, hold: str) -> list[int]:
+    """Inputs that a hold leaves to run on from sample to sample: lengths added to springs, with ``auto`` alone."""
+    return [
+        place for place, name in enumerate(model.input_channels) if hold == AUTOMATIC and name in model.optional_inputs
+    ]
 
 
 def references_of(model: Model, experiment: Experiment, mode: str) -> tuple[Array, Array]:
