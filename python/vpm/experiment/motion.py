@@ -107,7 +107,7 @@ class Motion(Result):
         straight line by a twelfth of what its slopes differ by.
         """
         if hold == "zero_order":
-            return replace(self, inputs=running_on(self.inputs, moving))
+            return replace(self, inputs=running_on(self.inputs, moving)) if moving else self
         means = running_on(self.inputs, range(self.inputs.shape[1]))
         if hold == "cubic":
             slopes = np.gradient(self.inputs, axis=0, edge_order=2)
