@@ -37,7 +37,7 @@ EVERY = 40
 def recorded(model: Model) -> Experiment:
     """Every fortieth sample of a run at 20 kHz, in which the road runs on and the motor's command is held."""
     time = np.arange(40_001) / 20e3
-    road = sum(2e-3 * np.sin(2.0 * np.pi * f * time + f) for f in (3.0, 5.3, 8.1))
+    road = np.sum([2e-3 * np.sin(2.0 * np.pi * f * time + f) for f in (3.0, 5.3, 8.1)], axis=0)
     held = np.repeat(200.0 * np.sin(2.0 * np.pi * 4.1 * time[::EVERY]), EVERY)[: time.size]
     columns = {"road.command": road, "motor.command": held}
     run = simulate(model, Experiment.from_arrays(time, columns, model=model), "free_run")

@@ -3,7 +3,7 @@
 import time as stopwatch
 from dataclasses import FrozenInstanceError
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -24,6 +24,8 @@ from vpm.experiment import (
 )
 from vpm.model import ChannelEntry, Model, load_channel_table
 from vpm.numbers import Array
+
+Irregular = Literal["error", "interpolate"]
 
 TABLE = {
     "time": ChannelEntry(column="t", unit="ms"),
@@ -704,3 +706,30 @@ def test_the_common_cutoff_is_the_lowest() -> None:
     quiet, noisy = moving(sigma=1e-7), moving(sigma=1e-3)
     chosen = [motion(each, Axis()).cutoff for each in (quiet, noisy)]
     assert common_cutoff([quiet, noisy], Axis()) == chosen[1] < chosen[0]
+
+
+def of_stamps(stamps: Array, irregular: Irregular = "error") -> Experiment:
+    """Record of stamps in s, whose readings are all different."""
+    return Experiment.from_arrays(
+        stamps, {"q": np.sin(np.arange(stamps.size) / 50.0)}, {"q": "rad"}, irregular=irregular
+    )
+
+
+@pytest.mark.parametrize("stamps", [np.floor(np.arange(7000) / 1000 * 1000) / 1000, np.round(np.arange(3000) / 300, 3)])
+@pytest.mark.parametrize("irregular", ["error", "interpolate"])
+def test_stamps_in_whole_milliseconds_are_taken_as_even(stamps: Array, irregular: Irregular) -> None:
+    """The first are cut numbers, of which some repeat and some are left out; the second go by 3, 3 and 4 ms."""
+    log = of_stamps(stamps, irregular)
+    assert len(log) == stamps.size
+    assert np.abs(log.time - stamps).max() < 1.1e-3
+    assert any("counts whole 0.001 s" in sentence for sentence in log.history)
+
+
+def test_a_lost_row_and_a_row_twice_are_no_rounding() -> None:
+    even = np.arange(3000) / 1000
+    with pytest.raises(ExperimentError, match="1 sample is missing"):
+        of_stamps(np.delete(even, 1000))
+    with pytest.raises(ExperimentError, match="delete the repeated row"):
+        of_stamps(np.insert(even, 1000, even[1000]))
+    with pytest.raises(ExperimentError, match=r"is missing|off the median"):
+        of_stamps(np.delete(np.round(np.arange(3000) / 300, 3), 1000))

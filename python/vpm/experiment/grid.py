@@ -70,6 +70,29 @@ def check_finite(values: Array, time: Array, what: str, source: Source, *, chann
         )
 
 
+def unrounded(time: Array) -> tuple[Array, float] | None:
+    """Even clock behind stamps that were rounded or cut to whole counts, and the count, s; None where none is.
+
+    Every stamp of such a clock lies within one count of a straight line. A lost row lengthens one step, a row that was
+    written twice leaves one of no length. Rounding does both: what one step lacks the next ones have.
+
+    ``time``: shape (N,), s
+    """
+    steps = np.diff(time)
+    usual = float(np.median(steps))
+    repeats = int(np.sum(steps == 0.0))
+    longer = int(np.sum(steps > GAP * usual))
+    lost = longer > 0 if not repeats else repeats < 2 or abs(longer - repeats) > 1
+    if time.size < FEWEST_SAMPLES or usual <= 0.0 or steps.min() < 0.0 or lost:
+        return None
+    counts = (10.0**-digits for digits in range(7))
+    whole = (one for one in counts if np.allclose(time / one, np.round(time / one), rtol=0.0, atol=1e-3))
+    count = next(whole, 0.0)
+    even = np.polynomial.Polynomial.fit(np.arange(time.size), time, 1)(np.arange(time.size))
+    off = np.ptp(time - even)
+    return (even, count) if STEP_TOLERANCE * usual < off <= 1.05 * count else None
+
+
 def usual_step(time: Array) -> float:
     """Mean step of a clock, s, without its gaps: that of its grid.
 

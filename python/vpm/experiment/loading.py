@@ -18,6 +18,7 @@ from vpm.experiment.grid import (
     check_uniform,
     is_smooth,
     make_uniform,
+    unrounded,
 )
 from vpm.experiment.merge import merge_clocks
 from vpm.experiment.noise import FEWEST_SAMPLES, noise_std, quantisation_step
@@ -112,6 +113,11 @@ def _finish(make: type[R], draft: Draft, name: str, irregular: str, resample: fl
     if irregular not in {"error", "interpolate"}:
         raise ExperimentError(f'irregular="{irregular}" is not known; choose "error" or "interpolate"')
     check_finite(draft.time, draft.time, "the time", draft.source, channel="time")
+    if even := unrounded(draft.time):
+        draft.time, count = even
+        draft.history.append(
+            f"The clock counts whole {count:g} s; the samples were taken as evenly spaced, as all stamps allow."
+        )
     check_increasing(draft.time, draft.source)
     slower = _take_fresh(draft, irregular)
     read_at = {channel: own for channel, own in draft.clocks.items() if not is_smooth(channel)}
