@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 REMEMBERED = "nobody knows what the spring at {site} remembers of the motion before each record"
 #: Part of the name of a parameter that acts behind a joint that is split.
 BEHIND = ".link."
+#: Units of measured forces and moments.
+FORCES = ("N", "N m")
 
 
 class NoResidualError(VpmError):
@@ -50,8 +52,8 @@ def tracker_gaps(
     """Errors of the ranking's tracker on validation records at joints with play, or without inverse-dynamics residual.
 
     So of shafts that turn with such a joint, and of readings of a sensor at which an effect was named, unless the
-    residual has ``judged`` them or follows them. Of all channels where there is no such residual, and so no joint of
-    which the efforts are ``balanced``.
+    residual has ``judged`` them or follows them. So of measured forces, as of a load cell, which no residual of efforts
+    holds. Of all channels where there is no such residual, and so no joint of which the efforts are ``balanced``.
     """
     model, joints = ranking.recalibrated, set(ranking.recalibrated.joints) - set(balanced or ())
     joints |= joints_with_play(ranking.model)
@@ -64,7 +66,7 @@ def tracker_gaps(
         for channel, gap in ranking.gaps.items()
         if balanced is None
         or channel.rpartition(".")[0] in joints
-        or (channel not in followed and ranking.model.sensor_of(channel) in named)
+        or (channel not in followed and (gap.unit in FORCES or ranking.model.sensor_of(channel) in named))
     }
 
 

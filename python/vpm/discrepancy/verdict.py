@@ -95,7 +95,9 @@ def verdict(
         doubt = _doubt(nominal.model, found.ranked, recalibrated)
         word, said = _nothing_missing(data, nominal, recalibrated, (errors.main, errors.beside), errors.worst, doubt)
         return word, said + _unheard(gap, nominal.model), False
-    clear = f"The residual is structured and {errors.above:.2g} times the noise floor, and"
+    beside = "" if errors.structured or data is None else ", ".join(open_readings(gap))
+    subject = f"What is left of {beside}" if beside else "The residual"
+    clear = f"{subject} is structured and {errors.above:.2g} times the noise floor, and"
     numbers = f"Error on validation data: {_stages(errors.worst)}."
     if found.interrupted:
         return "interrupted", f"{clear} no effect was accepted until then. {numbers}", False
