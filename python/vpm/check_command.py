@@ -8,7 +8,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vpm.command import Channels, Hold, Integrator, Interpolate, Logs, ModelPath, Workers, console, load_all, searching
+from vpm.command import (
+    Channels,
+    FoundHold,
+    Integrator,
+    Interpolate,
+    Logs,
+    ModelPath,
+    Workers,
+    console,
+    load_all,
+    searching,
+)
 from vpm.command_output import give, wrote
 from vpm.errors import ModelError
 from vpm.files import probe_file, write_text
@@ -31,7 +42,7 @@ def check(
     channels: Channels = None,
     interpolate: Interpolate = False,
     integrator: Integrator = "auto",
-    hold: Hold = "zero_order",
+    hold: FoundHold = "auto",
     workers: Workers = 0,
 ) -> None:
     """Find wrong units, signs, names and clocks of logs, before anything is concluded from them.
