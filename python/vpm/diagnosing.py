@@ -70,7 +70,7 @@ from vpm.one_thread import in_one_thread
 from vpm.ranking import Ranking, Settings
 from vpm.ranking.by_tracker import deviations_by_tracker, diagnosed_by_tracker
 from vpm.ranking.substitute_records import why_unbalanced
-from vpm.simulate import Setup, judging_mode
+from vpm.simulate import Setup, judging_mode, with_running_lengths
 from vpm.simulate.setup import READ_BACK
 from vpm.tasks import done_by
 
@@ -233,7 +233,9 @@ def diagnosed(
 ) -> Diagnosis:
     """Diagnosis of `diagnose` without its provenance; a task for an executor."""
     effects, cutoff, limit = asked.get("effects"), asked.get("cutoff"), asked.get("limit")
-    setup = asked.get("setup") or Setup()
+    begun = asked.get("setup") or Setup()
+    several, setup = with_running_lengths(model, [*experiments, *validate], begun)
+    experiments, validate = several[: len(experiments)], several[len(experiments) :]
     records = records_of(model, experiments, validate)
     if cutoff is not None:
         for record in chain(*records[:2]):

@@ -93,7 +93,7 @@ def data_of(
     def balance(
         several: Sequence[Experiment], cut: float | Sequence[float] | None, band: Sequence[float] | float | None = None
     ) -> InverseDynamicsProblem:
-        problem = InverseDynamicsProblem(model, several, cutoff=cut, band=band, hold=setup.hold)
+        problem = InverseDynamicsProblem(model, several, cutoff=cut, band=band, hold=setup.course)
         return relative_to_drives(model, problem, constants, {})
 
     fitted = balance(training, cutoff)

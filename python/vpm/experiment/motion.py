@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
@@ -54,13 +54,6 @@ class Machine(Protocol):
         """Input channels beside the motion that are zero where the log does not hold them."""
 
 
-def running_on(inputs: Array, places: Sequence[int]) -> Array:
-    """Inputs (N, nu) of a motion, of which those at some places are their mean until the next sample."""
-    means = inputs.copy()
-    means[:-1, places] = 0.5 * (inputs[:-1, places] + inputs[1:, places])
-    return means
-
-
 @dataclass(frozen=True, repr=False, eq=False)
 class Motion(Result):
     """Filtered motion of all joints and the commands on the grid of the log.
@@ -100,15 +93,15 @@ class Motion(Result):
     decimation: int
     notes: tuple[str, ...]
 
-    def held_as(self, hold: str, moving: Sequence[int] = ()) -> Motion:
+    def held_as(self, hold: str) -> Motion:
         """The motion with inputs of another hold, see `vpm.Setup`: each is its mean until the next sample.
 
-        Held inputs are that already, but for those at the places ``moving``, which run on. A cubic lies off the
-        straight line by a twelfth of what its slopes differ by.
+        Held inputs are that already. A cubic lies off the straight line by a twelfth of what its slopes differ by.
         """
         if hold == "zero_order":
-            return replace(self, inputs=running_on(self.inputs, moving)) if moving else self
-        means = running_on(self.inputs, range(self.inputs.shape[1]))
+            return self
+        ahead = np.concatenate([self.inputs[1:], self.inputs[-1:]])
+        means = 0.5 * (self.inputs + ahead)
         if hold == "cubic":
             slopes = np.gradient(self.inputs, axis=0, edge_order=2)
             means[:-1] -= np.diff(slopes, axis=0) / 12.0

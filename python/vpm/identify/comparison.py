@@ -58,7 +58,7 @@ def problem(
     if mode not in FIT_MODES:
         raise IdentificationError(f"unknown mode '{mode}'; choose one of {', '.join(FIT_MODES)}")
     if mode == "inverse_dynamics":
-        return InverseDynamicsProblem(model, experiments, cutoff=cutoff, hold=(setup or Setup()).hold)
+        return InverseDynamicsProblem(model, experiments, cutoff=cutoff, hold=(setup or Setup()).course)
     if mode == "input_error":
         return InputErrorProblem(model, experiments, channels=channels, setup=setup, cutoff=cutoff, workers=workers)
     if mode == "prediction_error":

@@ -47,7 +47,7 @@ from vpm.identify.statistics import freedom, record_groups, sandwich
 from vpm.model import Model
 from vpm.numbers import Array
 from vpm.one_thread import in_one_thread
-from vpm.simulate import AUTOMATIC, HOLDS, Setup
+from vpm.simulate import AUTOMATIC, HOLDS, Setup, with_running_lengths
 from vpm.simulate.setup import READ_BACK
 
 #: Times that an observer gets gains of the values that it led to, and the move (in deviations) after which it need not.
@@ -114,6 +114,8 @@ def identify(
     """
     records, names, checks = as_records(experiments), _names(model, free), checks or Checks()
     setup = setup or Setup()
+    if mode != "closed_loop":
+        records, setup = with_running_lengths(model, records, setup)
     records = followed(model, records, mode, names)
     fitted = partial(
         _fitted, model, records, names, mode, cutoff, dict(ties or {}), tolerance, progress, fitting, checks, executor

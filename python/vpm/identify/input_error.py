@@ -184,7 +184,7 @@ class InputErrorProblem:
         rows = starts[:, None] + np.arange(1, length)
         measured = np.stack([experiment[name][rows] for name in names], axis=2) * self._weights
         states = measured_states(model, experiment, model.theta, starts, cutoff)
-        inputs = simulation_inputs(model, experiment, self._setup)
+        inputs = simulation_inputs(model, experiment)
         self._follow_commands(model, inputs, states, starts, experiment)
         tiled = inputs[starts[:, None] + np.arange(length)].reshape(len(starts) * length, -1)
         places = np.arange(len(starts), dtype=np.int64) * length

@@ -33,7 +33,6 @@ from vpm.initial import joint_motion
 from vpm.model import Model
 from vpm.numbers import Array
 from vpm.simulate import AUTOMATIC
-from vpm.simulate.inputs import lengths_of
 from vpm.simulate.setup import HOLDS
 
 #: One step of second order for each sample, and the share of what drives answer that it may be off by: noise of
@@ -85,8 +84,7 @@ class InverseDynamicsProblem(BegunAnywhere):
         self.experiments = tuple(experiments)
         #: What was given: the model before any fit.
         self.nominal = model
-        self.hold = HOLDS[0] if hold == AUTOMATIC else hold
-        self._moving = lengths_of(model, hold)
+        self.hold = hold
         self._bands = tuple(_each(band, experiments))
         self.motions = self._motions(experiments, _each(cutoff, experiments))
         for m in self.motions:
@@ -116,7 +114,7 @@ class InverseDynamicsProblem(BegunAnywhere):
 
     def _motions(self, experiments: Sequence[Experiment], cutoffs: Sequence[float | None]) -> tuple[Motion, ...]:
         return tuple(
-            joint_motion(e, self.nominal, cutoff, commanded=True, band=band).held_as(self.hold, self._moving)
+            joint_motion(e, self.nominal, cutoff, commanded=True, band=band).held_as(self.hold)
             for e, cutoff, band in zip(experiments, cutoffs, self._bands, strict=True)
         )
 

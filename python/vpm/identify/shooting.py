@@ -230,7 +230,7 @@ class ShootingProblem(OutputErrorProblem):
             )
             return run.outputs[None], run.jacobian[None]
         setup = self._setup
-        inputs = simulation_inputs(model, experiment, setup)
+        inputs = simulation_inputs(model, experiment)
         stepping = (experiment.dt, setup.substeps, setup.method(model), columns, setup.course)
         return model.core.restart(theta, states, pieces.starts, pieces.length, inputs, *stepping)
 

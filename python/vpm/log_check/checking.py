@@ -23,7 +23,7 @@ from vpm.model import ChannelEntry, Model
 from vpm.numbers import Array, rough_percent
 from vpm.observer import measured_outputs
 from vpm.one_thread import in_one_thread
-from vpm.simulate import Setup
+from vpm.simulate import Setup, with_running_lengths
 
 #: What else it may be that looks like a mistake.
 DELAY = "a clock of the log, or a delay of the machine or of its sensors"
@@ -87,7 +87,8 @@ def check_log(
     checked = "the first record"
     try:
         records = as_records(experiments)
-        judge = Judge(model, settings, setup or Setup(), records)
+        records, setup = with_running_lengths(model, records, setup or Setup())
+        judge = Judge(model, settings, setup, records)
         check = _Check(judge, ParallelCandidates(workers, progress))
         begun: list[_Begun] = []
         for record in records:

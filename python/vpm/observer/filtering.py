@@ -37,9 +37,7 @@ class Record:
     first: Array  #: Shape (nx,); state at the first sample as the log suggests it.
 
     @classmethod
-    def of(
-        cls, model: Model, experiment: Experiment, channels: Sequence[str] | None = None, *, setup: Setup | None = None
-    ) -> Record:
+    def of(cls, model: Model, experiment: Experiment, channels: Sequence[str] | None = None) -> Record:
         """Record of a log for filtering.
 
         Raises
@@ -60,7 +58,7 @@ class Record:
                     f'channels: "{name}" is not in {experiment.name}, which holds {", ".join(experiment.channels)}'
                 )
         readings = np.column_stack([experiment[name] for name in names])
-        inputs = held_inputs(model, experiment, "observe", setup or Setup())
+        inputs = held_inputs(model, experiment, "observe")
         first = initial_state(model, experiment, model.theta)
         return cls(experiment.name, experiment.time, experiment.dt, names, readings, inputs, first)
 

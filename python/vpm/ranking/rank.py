@@ -16,7 +16,7 @@ from vpm.one_thread import in_one_thread
 from vpm.ranking.ranking_search import Search
 from vpm.ranking.result import Ranking
 from vpm.ranking.settings import Settings
-from vpm.simulate import Setup
+from vpm.simulate import Setup, with_running_lengths
 
 #: Said of channels that are not compared.
 COMPUTED = "{channel} repeats the noise of {source}, from which it was computed: it tells nothing more"
@@ -81,10 +81,12 @@ def rank(
     >>> rank(model, log).effects
     (Ranked(effect='coulomb_friction', site='axis', judgement=Judgement(removed=0.97)),)
     """
-    records = [joints_from_sensors(record, model, free=model.adjustable) for record in as_records(experiments)]
-    unseen = [joints_from_sensors(record, model) for record in as_records(() if validate is None else validate)]
-    if not records:
+    fitted, others = as_records(experiments), as_records(() if validate is None else validate)
+    if not fitted:
         raise DiagnosisError("no record was given; pass at least one experiment")
+    several, setup = with_running_lengths(model, [*fitted, *others], setup or Setup())
+    records = [joints_from_sensors(record, model, free=model.adjustable) for record in several[: len(fitted)]]
+    unseen = [joints_from_sensors(record, model) for record in several[len(fitted) :]]
     check_moving(model, records)
     model, zeros = with_unknown_zeros(model, records)
     derived = derived_channels(records)

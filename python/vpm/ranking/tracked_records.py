@@ -91,7 +91,7 @@ class TrackedRecords:
     ) -> None:
         self.model, self.settings, self.setup = model, settings, setup or Setup()
         self.experiments = tuple(experiments)
-        self.records = tuple(_records(model, self.experiments, self.setup))
+        self.records = tuple(_records(model, self.experiments))
         #: Channels to which the model is drawn.
         self.drawn_to = _drawn(model, self.records[0].channels) if self.records else ()
         #: Bandwidth with which pressures are drawn, Hz.
@@ -528,11 +528,11 @@ def among_parameters(own: int, columns: Sequence[int], moves: Array | None) -> t
     return places, ([columns[place] for place in places], None if moves is None else moves[places])
 
 
-def _records(model: Model, experiments: Sequence[Experiment], setup: Setup) -> Iterator[Record]:
+def _records(model: Model, experiments: Sequence[Experiment]) -> Iterator[Record]:
     """Tracked records with the outputs of a model, and deflections that all of them hold."""
     held = [channel for channel in model.deflections if all(channel in experiment for experiment in experiments)]
     for experiment in experiments:
-        record = Record.of(model, experiment, setup=setup)
+        record = Record.of(model, experiment)
         readings = np.column_stack([record.readings, *(experiment[channel] for channel in held)])
         yield replace(record, channels=(*record.channels, *held), readings=readings)
 

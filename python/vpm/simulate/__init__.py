@@ -1,6 +1,6 @@
 """Simulation of a log: `modes.py` says which question each mode answers."""
 
-from vpm.simulate.inputs import restart_grid, simulation_inputs
+from vpm.simulate.inputs import restart_grid, simulation_inputs, with_running_lengths
 from vpm.simulate.modes import (
     MODES,
     check_balance,
@@ -36,4 +36,5 @@ __all__ = [
     "simulate_arrays",
     "simulated_rows",
     "simulation_inputs",
+    "with_running_lengths",
 ]

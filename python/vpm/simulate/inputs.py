@@ -1,38 +1,27 @@
 """What the log holds for a simulation: commands, references, disturbances, pieces of a horizon."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError, SimulationError
 from vpm.experiment import Experiment
-from vpm.experiment.motion import running_on
 from vpm.model import Model
 from vpm.numbers import Array
 from vpm.simulate.setup import AUTOMATIC, Setup
 
 
-def held_inputs(model: Model, experiment: Experiment, mode: str, setup: Setup) -> Array:
-    """Commands and pressures of logged supplies, one column each; springs without a command keep their length.
-
-    The end of a spring cannot jump. Where nobody says what is held, its length is the mean until the next sample.
-    """
+def held_inputs(model: Model, experiment: Experiment, mode: str) -> Array:
+    """Commands and pressures of logged supplies, one column each; springs without a command keep their length."""
     _require(experiment, [name for name in model.input_channels if name not in model.optional_inputs], mode)
-    table = _optional(experiment, model.input_channels)
-    return running_on(table, lengths_of(model, setup.hold))
+    return _optional(experiment, model.input_channels)
 
 
-def simulation_inputs(model: Model, experiment: Experiment, setup: Setup) -> Array:
+def simulation_inputs(model: Model, experiment: Experiment) -> Array:
     """What a free run holds between samples, shape (N, inputs): commands and pressures of logged supplies."""
-    return held_inputs(model, experiment, "free_run", setup)
-
-
-def lengths_of(model: Model, hold: str) -> list[int]:
-    """Inputs that a hold leaves to run on from sample to sample: lengths added to springs, with ``auto`` alone."""
-    return [
-        place for place, name in enumerate(model.input_channels) if hold == AUTOMATIC and name in model.optional_inputs
-    ]
+    return held_inputs(model, experiment, "free_run")
 
 
 def references_of(model: Model, experiment: Experiment, mode: str) -> tuple[Array, Array]:
@@ -49,6 +38,28 @@ def references_of(model: Model, experiment: Experiment, mode: str) -> tuple[Arra
     commands = _optional(experiment, [f"{name}.command" for name in free])
     disturbances[:, [model.actuators.index(name) for name in free]] += commands
     return references, disturbances
+
+
+def with_running_lengths(
+    model: Model, experiments: Sequence[Experiment], setup: Setup
+) -> tuple[list[Experiment], Setup]:
+    """Records and setup with lengths that move springs run on from sample to sample, beside commands that are held.
+
+    The end of a spring cannot jump. Where logs hold its length and nobody says what is held, all inputs run on, and
+    commands of controllers do so half a sample later, as held ones come. Where no log does, nothing changes.
+    """
+    lengths = [name for name in model.input_channels if name in model.optional_inputs]
+    logged = any(np.ptp(record[name]) > 0.0 for record in experiments for name in lengths if name in record)
+    if not logged or setup.hold != AUTOMATIC or model.controlled_actuators:
+        return list(experiments), setup
+    held = [f"{name}.command" for name in model.actuators if f"{name}.command" not in lengths]
+    later = list(experiments)
+    for name in held:
+        for place, record in enumerate(later):
+            if name in record:
+                means = 0.5 * (record[name] + np.append(record[name][:1], record[name][:-1]))
+                later[place] = record.with_channel(name, means, record.unit(name))
+    return later, replace(setup, hold="first_order")
 
 
 def restart_grid(experiment: Experiment, horizon: float) -> tuple[NDArray[np.int64], int]:

@@ -199,7 +199,7 @@ def _dispatch(
     begin = np.zeros(1, dtype=np.int64)
     stepping = (experiment.dt, setup.substeps, setup.method(model), columns)
     if mode == "free_run":
-        inputs = held_inputs(model, experiment, mode, setup)
+        inputs = held_inputs(model, experiment, mode)
         state = start(model, experiment, theta) if initial_state is None else initial_state
         outputs, states, jacobian = model.core.simulate(theta, state, inputs, *stepping, setup.course)
         return SimulatedArrays(outputs, jacobian, rows, begin, states)
@@ -210,7 +210,7 @@ def _dispatch(
         outputs, states, jacobian = model.core.simulate_closed_loop(theta, state, references, disturbances, *stepping)
         return SimulatedArrays(outputs, jacobian, rows, begin, states)
     if mode == "restarts":
-        inputs = held_inputs(model, experiment, mode, setup)
+        inputs = held_inputs(model, experiment, mode)
         starts, length = restart_grid(experiment, setup.horizon)
         states = measured_states(model, experiment, theta, starts, cutoff)
         outputs, jacobian = model.core.restart(theta, states, starts, length, inputs, *stepping, setup.course)

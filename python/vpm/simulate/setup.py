@@ -59,8 +59,8 @@ class Setup(Storable):
         goes straight to the next sample, ``cubic`` smoothly: for signals that are continuous and were sampled, such as
         an analog reference or a command of a far faster controller. What controllers of the model command is always
         held.
-        ``auto`` is ``zero_order``, but where `vpm.rank` or `vpm.identify` finds out from the logs. The commands of
-        springs are lengths, which cannot jump: with ``auto`` each is its mean until the next sample.
+        ``auto`` is ``zero_order``, but where `vpm.rank` or `vpm.identify` finds out from the logs. Logged lengths that
+        move springs cannot jump: with ``auto`` they run on there, and in `vpm.diagnose`, beside held commands.
     """
 
     integrator: str = AUTOMATIC
