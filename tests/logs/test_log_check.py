@@ -321,9 +321,17 @@ def test_no_unit_of_a_bending_link_is_tried_whose_efforts_follow_from_its_motion
     assert not [name for name in tried if " in " in name or " times " in name]
 
 
+#: Channel of a bending link, what its readings are times the true ones, and the mistake that this is.
+BENDING = [
+    ("shoulder.position", np.degrees(1.0), "unit"),
+    ("root.strain", -1.0, "sign"),
+    ("motor.command", 1e3, "unit"),
+]
+
+
 @pytest.mark.parametrize(
     ("channel", "factor", "kind"),
-    [("shoulder.position", np.degrees(1.0), "unit"), ("root.strain", -1.0, "sign"), ("motor.command", 1e3, "unit")],
+    at_night(BENDING, but=BENDING[:2]),
 )
 def test_names_the_mistake_of_a_bending_link(channel: str, factor: float, kind: str) -> None:
     check, _ = swung_link({channel: factor})
