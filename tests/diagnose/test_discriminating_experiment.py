@@ -2,6 +2,7 @@
 
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ import pytest
 import vpm
 from model_texts import DAMPED_AXIS
 from vpm.discrepancy import ProposedExperiment
-from vpm.discrepancy.rivals.discriminating_experiment import _imitation
+from vpm.discrepancy.rivals.discriminating_experiment import _imitation, experiments
+from vpm.identify import InverseDynamicsProblem
 from vpm.numbers import Array
 
 STEP, NOISE = 1e-3, 0.02
@@ -142,3 +144,14 @@ def test_what_the_records_do_not_see_is_the_limit_of_what_they_see_badly() -> No
 
     assert imitated(np.inf) == pytest.approx(imitated(1e10), rel=1e-6)
     assert imitated(np.inf)[2] != pytest.approx(imitated(1e-4)[2], rel=0.1)
+
+
+def test_a_rival_whose_drive_has_states_is_left_out_and_does_not_end_the_judgement() -> None:
+    """Friction of a drive does not follow from its command alone, so its efforts are not those of a planned motion."""
+    model = vpm.Model.from_toml(DAMPED_AXIS)
+    rival = model.with_effect("drive_friction", at="drive", driving=0.1)
+    judged: Any = [SimpleNamespace(model=one) for one in (model, rival)]
+    trial = SimpleNamespace(judged=judged[1], label="drive_friction at drive")
+    rivals: Any = SimpleNamespace(site="axis", label="load_dependent_friction at axis", trials=(trial,))
+    data = InverseDynamicsProblem(model, [forward_only(1, 2.0)])
+    assert experiments(judged[0], [rivals], data, {}) == ()

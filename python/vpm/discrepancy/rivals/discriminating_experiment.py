@@ -44,8 +44,9 @@ def experiments(
     found = []
     for rivals in ambiguous:
         for trial in rivals.trials:
-            if has_hidden(trial.judged.model, data.motions[0].joints):
-                continue  # its residual needs a motion that no channel measures
+            other = trial.judged.model
+            if has_own_drives(other) or has_hidden(other, data.motions[0].joints):
+                continue  # its residual needs states of a drive, or a motion that no channel measures
             here = joint_at(final.model, rivals.site)
             joint = here if here in data.joints else data.joints[0]
             best = propose(final, trial.judged, (rivals.label, trial.label), excitation_range(data, joint), noise)
