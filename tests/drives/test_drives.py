@@ -44,7 +44,7 @@ def test_a_servo_cylinder_reaches_the_core_as_it_is_written() -> None:
         "rod": "servo.cylinder.rod",
     }
     assert names[drive["cylinder"]["stop"]["damping"]] == "servo.cylinder.stop_damping"
-    assert drive["cylinder"]["seal"] == {"viscous": None, "coulomb": None, "stribeck": None}
+    assert drive["cylinder"]["seal"] == {"viscous": None, "coulomb": None, "stribeck": None, "pressed": None}
     assert theta["servo.valve.frequency"] == pytest.approx(2 * math.pi * 250.0)
     assert theta["servo.cylinder.stop_stiffness"] == 5e8
 
